@@ -29,6 +29,8 @@ SHEETS = (".xlsx", ".xlsm", ".ods", ".parquet")
 #: Characters of the beginning that are looked at, and more if these are few lines.
 _HEAD, _MORE = 1 << 16, 1 << 22
 _FEW_LINES = 24
+#: So many first lines are looked at, and as many over the rest of a file.
+_SPREAD = 1000
 
 
 def beginning(path: Path, count: int = _HEAD) -> bytes:
@@ -56,8 +58,8 @@ class Text:
         self.path = path
         self.is_file = path.suffix.lower() not in (*SHEETS, *ARRAYS) and not self._rows
         self._encoding = ""
-        #: Whether the last of the lines that were read has an end.
-        self.ends_in_line = True
+        #: Whether the last of the lines that were read has an end, and whether more follow those of the head.
+        self.ends_in_line, self.goes_on = True, False
 
     @property
     def encoding(self) -> str:
@@ -99,11 +101,26 @@ class Text:
         """The first lines; the last of them is whole, if the text goes on."""
         lines, count = list[str](), 0
         for line in self.lines():
-            if count > _MORE or (count > _HEAD and len(lines) >= _FEW_LINES):
+            if count > _MORE or len(lines) >= _SPREAD or (count > _HEAD and len(lines) >= _FEW_LINES):
+                self.goes_on = True
                 break
             lines.append(line)
             count += len(line) + 1
         return lines
+
+    @cached_property
+    def spread(self) -> list[str]:
+        """Lines that are spread over the rest of a file of bytes, about a thousand; none of a compressed one."""
+        begin = sum(len(line) + 1 for line in self.head)
+        if not self.is_file or self.path.suffix.lower() == ".gz" or self.encoding.startswith("utf-16"):
+            return []
+        rest, longest = self.path.stat().st_size - begin, 2 * max(map(len, self.head), default=0) + 2
+        found = list[bytes]()
+        with open(self.path, "rb") as file:
+            for place in range(0, max(0, rest), max(1, rest // min(_SPREAD, 1 + _MORE // longest))):
+                file.seek(begin + place)
+                found += file.read(longest).split(b"\n")[1:2]
+        return [line.decode(self.encoding, "replace").rstrip("\r") for line in found]
 
     @contextmanager
     def opened(self) -> Iterator[IO[str]]:

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,6 +16,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.formats.layout import Table
 from taxel.formats.lines import MISSING, OTHER, WITH_THOUSANDS, is_number, number_of, read_line
+from taxel.formats.roles import Role
 from taxel.formats.times import ISO, UNITS_US, is_time, seconds_of
 
 
@@ -54,6 +54,8 @@ class Form:
         Number of lines of a frame of a live source, 0 if only an empty line shows it.
     keys : mapping
         What was understood beyond what is stated of a live source, as its keys.
+    roles : sequence of Role
+        Of each column.
     """
 
     table: Table
@@ -63,6 +65,7 @@ class Form:
     own: tuple[str, ...] = ()
     lines: int = 1
     keys: Mapping[str, str] = field(default_factory=dict)
+    roles: Sequence[Role] = ()
 
     def called(self, column: int) -> str:
         """Return the name of a column, or its number if it has none."""
@@ -78,12 +81,11 @@ class Form:
         """
         how, names = self.table, self.names
         times, taxel = (
-            () if getattr(how, key) is None else places_of(names, key, getattr(how, key))
+            places_of(names, key, getattr(how, key)) if getattr(how, key) else ()
             for key in ("time_column", "taxel_column")
         )
         label, by = (
-            None if getattr(how, key) is None else place_of(names, key, getattr(how, key))
-            for key in ("label_column", "by")
+            place_of(names, key, getattr(how, key)) if getattr(how, key) else None for key in ("label_column", "by")
         )
         counts = Counter(names)
         at = {name: k for k, name in enumerate(names) if counts[name] == 1}
@@ -93,7 +95,7 @@ class Form:
             raise ProblemError(f"column {shown(names[twice])} is the time_column, but is also in leave_out")
         others = {*left, *times, *taxel, label, by}
         taxels = (k for k in range(len(names)) if k not in others)
-        kept = tuple(k for k in taxels if how.keep is None or fnmatchcase(names[k], how.keep))
+        kept = tuple(k for k in taxels if how.keeps(names[k]))
         return Columns(times, taxel, label, by, kept)
 
     @property

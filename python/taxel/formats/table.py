@@ -119,7 +119,8 @@ def read_table(
         sources = {"": _events(path, full, form, rows, array)}
     else:
         values, names = _frames_of_lines(path, full, form, rows, said), [form.names[k] for k in columns.taxels]
-        empty = np.isnan(values).all(axis=(0, 1)) if form.said and values.shape[1] == 1 else np.zeros(1, bool)
+        is_found = layout.stated.isdisjoint(("leave_out", "keep")) and values.shape[1] == 1
+        empty = np.isnan(values).all(axis=(0, 1)) if is_found else np.zeros(1, bool)
         if empty.any() and not empty.all():
             places = [columns.taxels[k] for k in np.flatnonzero(empty)]
             said.append(f"{', '.join(map(form.called, places))} left out: empty")
@@ -140,8 +141,8 @@ def read_table(
             own = dict(sources_of(path, full, key, of_part, t, names if any(names) else None))
             sources |= own
             notes |= dict.fromkeys(own, _labels(form, beside, t))
-    said = said if form.said else []
-    return readers_of(path, "table", sources, full, said, timed=rows.times is not None, lost=lost, notes=notes)
+    timed = rows.times is not None
+    return readers_of(path, "table", sources, full, said, timed=timed, lost=lost, notes=notes, roles=form.roles)
 
 
 def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:

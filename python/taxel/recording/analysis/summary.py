@@ -98,6 +98,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
         "layout": recording._main.facts.layout,
+        "roles": list(recording._main.facts.roles),
     }
 
 
