@@ -165,6 +165,51 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
         [0, 10_000],
         [[1], [3]],
     ),
+    "milliseconds behind a comma": (
+        "".join(f"2024-05-01 10:00:0{k // 4},{250 * (k % 4):03},{k % 3}\n" for k in range(9)),
+        [1_714_557_600_000_000 + 250_000 * k for k in range(9)],
+        [[k % 3] for k in range(9)],
+    ),
+    "numbers as texts have them": (
+        "t_ms;a;b\n0;1 200,5;\N{MINUS SIGN}3\n10;1 201,5;\N{MINUS SIGN}4,5\n20;13 202,5;6\n",
+        [0, 10_000, 20_000],
+        [[1200.5, -3], [1201.5, -4.5], [13202.5, 6]],
+    ),
+    "cells without a value": (
+        "t_ms,a,b\n" + "".join(f"{10 * k},{('#N/A', 'inf', '?', '#DIV/0!', 1)[k % 5]},{k}\n" for k in range(9)),
+        [10_000 * k for k in range(9)],
+        [[1 if k % 5 == 4 else np.nan, k] for k in range(9)],
+    ),
+    "a cell that is no number is missing": (
+        "t_ms,a,b\n" + "".join(f"{10 * k},{'wet' if k == 7 else k % 4},{k % 3}\n" for k in range(30)),
+        [10_000 * k for k in range(30)],
+        [[np.nan if k == 7 else k % 4, k % 3] for k in range(30)],
+    ),
+    "empty lines of a spreadsheet": (
+        "t_ms;a;b\n0;1;2\n10;1;3\n20;2;3\n" + ";;\n" * 9,
+        [0, 10_000, 20_000],
+        [[1, 2], [1, 3], [2, 3]],
+    ),
+    "numbers above frames": (
+        "name,,\n3,,\n,,\nFrame 0 (0.00 ms),,\n0,1,2\n0,1,3\n,,\nFrame 1 (2.00 ms),,\n0,1,2\n0,1,4\n",
+        [0, 2000],
+        [[0, 1, 2, 0, 1, 3], [0, 1, 2, 0, 1, 4]],
+    ),
+    "days of a spreadsheet": (
+        "time,a\n" + "".join(f"{45413 + k / 86400:.8f},{k % 3}\n" for k in range(4)),
+        [1_714_521_600_000_000, 1_714_521_600_999_648, 1_714_521_602_000_160, 1_714_521_602_999_808],
+        [[0], [1], [2], [0]],
+    ),
+    "days of MATLAB": (
+        "datenum,a\n" + "".join(f"{739373 + k / 4},{k % 3}\n" for k in range(3)),
+        [1_714_521_600_000_000 + 21_600_000_000 * k for k in range(3)],
+        [[0], [1], [2]],
+    ),
+    "a time that repeats before a pause": (
+        "t_ms,a\n0,1\n10,1\n20,1\n20,2\n5000,1\n5010,1\n",
+        [0, 10_000, 20_000, 30_000, 5_000_000, 5_010_000],
+        [[1], [1], [1], [2], [1], [1]],
+    ),
     "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
 }
 
@@ -370,6 +415,9 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
         ("t_s,a\n0,1\n9e99,2\n", None, None),
         ("1,2\n3,4\n\n5,6\n", "[table]\nseparator = ','\nframe_lines = 3", 4),
         ('{"a": {"t": 0, "p": [1, 2]}, "b": {"t": 1, "p": [3, 4]}}\n', None, None),
+        ("t_ms,a\n" + "1.71E+12,1\n1.71E+12,2\n" * 10, None, None),
+        ('t,p\n0.0,"[1 2 3 ... 7 8 9]"\n0.1,"[2 2 3 ... 7 8 9]"\n', None, 2),
+        ("t_ms,a\n" + "0,1\n10,x\n" * 9, None, None),
         ("time,a\n01/02/2024 10:00:00,1\n01/02/2024 10:00:01,2\n", None, None),
     ],
 )
@@ -428,6 +476,23 @@ def test_utf_16_without_its_mark_and_damaged_gzip_are_refused(tmp_path: Path, co
         opened(tmp_path, "time,a\n0,1\n".encode(code))
     with refused(FormatError, place=Place("b.csv.gz")):
         opened(tmp_path, gzip.compress(b"t_s,a\n" + b"0,1\n" * 9999)[:40], name="b.csv.gz")
+
+
+def test_parquet_is_read_as_it_is_typed(tmp_path: Path) -> None:
+    """Lists in cells too, also of lists, in full."""
+    random = np.random.default_rng(1)
+    grid, row = random.random((9, 20, 30)).astype(np.float32), random.integers(0, 9, (9, 1200))
+    table = pd.DataFrame({"timestamp": np.arange(9) / 30, "frame_index": range(9), "slip": [False, True] * 4 + [True]})
+    table["palm"], table["thumb"] = [frame.tolist() for frame in grid], list(row)
+    pytest.importorskip("pyarrow")
+    table.to_parquet(tmp_path / "a.parquet")
+    found = opened_by(read_table, tmp_path / "a.parquet", None)
+    t, values = frames(found)
+    assert t == [round(k * 1e6 / 30) for k in range(9)]
+    np.testing.assert_array_equal(values, np.column_stack([grid.reshape(9, -1), row]))
+    assert "frame_index left out: a counter" in found.said
+    again = opened_by(read_table, tmp_path / "a.parquet", of_layout(found.layout))
+    assert again.sources == found.sources
 
 
 @pytest.mark.parametrize("ending", [".xlsx", ".parquet"])

@@ -83,7 +83,12 @@ class Text:
         self._encoding = "latin-1"
 
     def lines(self) -> Iterator[str]:
-        """Yield all lines without their ends."""
+        """Yield all lines without their ends; of a typed table its cells between tabs, below their names."""
+        if self.typed is not None:
+            for begin in range(0, max(1, len(self.typed)), _SPREAD):
+                part = self.typed[begin : begin + _SPREAD].to_csv(sep="\t", index=False, header=not begin)
+                yield from part.splitlines()
+            return
         count = 0
         with self.opened() as text:
             try:
@@ -157,6 +162,32 @@ class Text:
         return document if are_rows and len(document) > 1 else []
 
     @cached_property
+    def typed(self) -> Any:
+        """The DataFrame of a table of Parquet, a column for each place in its lists; None of any other file."""
+        if self.path.suffix.lower() != ".parquet":
+            return None
+        import pandas as pd  # noqa: PLC0415  takes long
+
+        try:
+            table = pd.read_parquet(self.path)
+        except Exception as error:  # of pyarrow
+            raise self._damaged(error) from None
+        named = table if type(table.index) is pd.RangeIndex else table.reset_index()
+        columns = (each for name in named.columns for each in _columns_in(str(name), named[name]))
+        return pd.DataFrame(dict(columns))
+
+    def _damaged(self, error: Exception) -> Exception:
+        """Return the error of a table that pandas does not read."""
+        if isinstance(error, ImportError):
+            text = f"to read it, taxel needs pandas with openpyxl and pyarrow: {installing('tables')}"
+            return ImportError(f"{self.path}: {text}")
+        if self.path.suffix.lower() != ".parquet" and beginning(self.path, 4) == b"\xd0\xcf\x11\xe0":
+            return unreadable(
+                "is encrypted, or of an older kind; save it without a password, as .xlsx or .csv", self.path
+            )
+        return damaged(self.path, f"{self.path.suffix} file", first_line(error))
+
+    @cached_property
     def _sheet(self) -> str:
         """A table as lines of cells between tabs: a sheet with numbers, one of Parquet, or an array of records."""
         if self._rows:
@@ -173,18 +204,32 @@ class Text:
             columns = {name: _cells(column) for name, column in columns_of(records)}
             return str(pd.DataFrame(columns).to_csv(sep="\t", index=False))
         try:
-            if self.path.suffix.lower() == ".parquet":
-                table = pd.read_parquet(self.path)
-                named = table if type(table.index) is pd.RangeIndex else table.reset_index()
-                return str(named.to_csv(sep="\t", index=False))
             sheets = pd.read_excel(self.path, sheet_name=None, header=None, dtype=object)
-        except ImportError:
-            text = f"to read it, taxel needs pandas with openpyxl and pyarrow: {installing('tables')}"
-            raise ImportError(f"{self.path}: {text}") from None
-        except Exception as error:  # of zipfile, of XML, of pyarrow
-            raise damaged(self.path, f"{self.path.suffix} file", first_line(error)) from None
+        except Exception as error:  # of zipfile, of XML
+            raise self._damaged(error) from None
         largest = max(sheets.values(), key=lambda sheet: sheet.notna().to_numpy().sum(), default=pd.DataFrame())
         return str(largest.map(_cell).to_csv(sep="\t", index=False, header=False))
+
+
+def _columns_in(name: str, column: Any) -> Iterator[tuple[str, Any]]:
+    """Yield a column of a DataFrame, or a column for each place in its lists, if all have the same shape."""
+    first = column.iloc[0] if len(column) else None
+    if column.dtype != object or not isinstance(first, np.ndarray | list):
+        yield name, column
+        return
+    try:
+        values = np.stack([_values_in(cell) for cell in column])
+    except ValueError:
+        yield name, column.map(str)
+        return
+    for place in np.ndindex(values.shape[1:]):
+        yield name + "".join(f"[{k}]" for k in place), values[:, *place]
+
+
+def _values_in(cell: Any) -> NDArray[Any]:
+    """Return the values of a list in a cell, or of lists in it, as arrays of pyarrow hold them."""
+    values = np.asarray(cell)
+    return np.stack([_values_in(each) for each in cell]) if values.dtype == object and len(values) else values
 
 
 def _rows_in(document: Any) -> Any:

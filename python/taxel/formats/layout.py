@@ -43,13 +43,13 @@ class Table:
         The names of the columns, for a table without names.
     time_column : str or int, optional
         The column of times, by its name or its number from 1; "A+B" is the sum of seconds and of nanoseconds within
-        them; 0: none.
+        them, or of a time of day and the milliseconds behind a comma; 0: none.
     time_unit : {"s", "ms", "us", "ns", "min", "h", "iso"}
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
         days with points (01.05.2024 10:15:02,010), with slashes and the year first (2024/5/1 10:15:02) and with the
         month by its name (01-May-2024 10:15:02) too, and, with AM or PM, with slashes, the month first.
-    missing : str, optional
-        A further cell without a value, beside those of `taxel.formats.lines.MISSING`.
+    missing : str or list of str, optional
+        Further cells without a value, beside those of `taxel.formats.lines.MISSING`.
     thousands : str, optional
         Character between the thousands of a number: 1.234,5 has "."; default: none.
     leave_out : list of str or int
@@ -89,7 +89,7 @@ class Table:
     columns: Sequence[str] = ()
     time_column: str | int | None = None
     time_unit: str = "s"
-    missing: str | None = None
+    missing: str | Sequence[str] | None = None
     thousands: str | None = None
     leave_out: Sequence[str | int] = ()
     keep: str | None = None
@@ -113,9 +113,11 @@ class Table:
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         integer("skip_lines", self.skip_lines, 0)
         _check_columns(self, "time_column", "label_column", "by", "taxel_column", "leave_out")
-        for name in ("keep", "missing", "frame_begin"):
+        for name in ("keep", "frame_begin"):
             if getattr(self, name) is not None:
                 text(name, getattr(self, name))
+        for cell in self.missing_texts:
+            text("missing", cell)
         for column in several("columns", self.columns):
             text("columns", column)
         if self.frame_time is not None and text("frame_time", self.frame_time, UNITS_US) and self.frame_begin is None:
@@ -130,6 +132,11 @@ class Table:
     def has_lines(self) -> bool:
         """Whether a frame may have several lines."""
         return not (self.frame_lines is None and self.frame_end is None and self.frame_begin is None)
+
+    @property
+    def missing_texts(self) -> Sequence[str]:
+        """The further cells without a value."""
+        return [self.missing] if isinstance(self.missing, str) else () if self.missing is None else self.missing
 
     def keeps(self, name: str) -> bool:
         """Whether a column of this name may be a taxel."""

@@ -134,7 +134,7 @@ def fits_in(
         in_hex, is_sure = _hex(all_lines, lines)
         if is_sure and in_hex is not None:
             return [in_hex], False
-        missing = () if how is None else _listed(how.missing)
+        missing = () if how is None else how.missing_texts
         return list(fits_of(lines, _FORMS, missing, wanted)), in_hex is not None
     keys = {"lines": 0, "separator": 1, "decimal": 2}
     forms = [
@@ -143,11 +143,7 @@ def fits_in(
     if not forms or ("lines" not in stated.stated and "separator" in stated.stated):
         forms = [form for form in forms if form[0] == "plain"] or [(how.lines, how.separator, how.decimal)]
     is_said = not stated.stated.isdisjoint(("decimal", "thousands"))
-    return list(fits_of(lines, forms, _listed(how.missing), wanted, how.thousands, is_said=is_said)), False
-
-
-def _listed(missing: str | Sequence[str] | None) -> tuple[str, ...]:
-    return () if missing is None else (missing,) if isinstance(missing, str) else tuple(missing)
+    return list(fits_of(lines, forms, how.missing_texts, wanted, how.thousands, is_said=is_said)), False
 
 
 def fits_of(

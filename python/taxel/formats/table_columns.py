@@ -138,6 +138,10 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     is_sure = column_names.is_time(names[column]) and fit.ascends(column)
     draft.be("time", draft.roles[column].why or "named so", column, certainty=SURE if is_sure else LIKELY)
     draft.set(time_column=draft.called(column))
+    if _has_milliseconds(fit, column):
+        draft.set(time_column=f"{draft.called(column)}+{draft.called(column + 1)}")
+        draft.be("time", "milliseconds behind a comma", column + 1)
+        return column
     seconds = next((k for k in (column, column - 1) if _has_nanoseconds(draft, k)), None)
     if seconds is None:
         return column
@@ -173,6 +177,14 @@ def _named_time(draft: Draft) -> tuple[int | None, list[int]]:
     # Of two clocks one may be in whole seconds.
     best = max(scores, key=lambda k: (scores[k], 2 * len(set(fit.cells(k))) > len(fit.body), -k), default=None)
     return best, [k for k in scores if k != best and scores[k] >= 4]
+
+
+def _has_milliseconds(fit: Fit, column: int) -> bool:
+    """Return whether the column after one of times in whole seconds has their milliseconds, which a comma separates."""
+    if fit.separator != "," or fit.types[column] != "time" or column + 1 >= fit.count:
+        return False
+    whole = all(cell.count(":") == 2 and not {".", ","} & {*cell[-4:]} for cell in fit.cells(column))
+    return whole and all(len(cell) == 3 and cell.isdecimal() for cell in fit.cells(column + 1))
 
 
 def _has_nanoseconds(draft: Draft, column: int) -> bool:
@@ -320,7 +332,9 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
     yield "label", f"labels{reads}" * (column_names.is_label(name) and few)
     if column_names.is_key(name) and whole:
         # Lines of one time may be of many taxels.
-        yield "sensor", _key(draft, column) if few or 2 * len(set(cells)) <= len(cells) else "a counter"
+        is_clock = _rises(fit, column) and _is_even(numbers) and not fit.counts(column)
+        repeats = few or 2 * len(set(cells)) <= len(cells)
+        yield "sensor", _key(draft, column) if repeats else "" if is_clock else "a counter"
     yield "no taxel", "another quantity" * column_names.is_other(name, draft.units[column])
 
 
@@ -410,7 +424,7 @@ def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
     return [k for k in taxels if not draft.roles[k].is_left]
 
 
-def by_values(draft: Draft, taxels: list[int], text: Text) -> list[int]:
+def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> list[int]:
     """Return the columns of readings without those that hold something else by their values; ask of those that may.
 
     The values are those of the first lines and of some over the whole text. A column of a series, whose names differ in
@@ -432,7 +446,9 @@ def by_values(draft: Draft, taxels: list[int], text: Text) -> list[int]:
         at, steps = taxels.index(k), np.diff(fit.numbers(k))
         numbers = whole[:, at]
         values, few = set(numbers[np.isfinite(numbers)].tolist()), len(steps) < _COUNTS
-        if not few and (steps == 1).mean() >= 0.95:
+        if not few and time is not None and _rises(fit, k) and _is_even(fit.numbers(k)):
+            _ask_of_two_times(draft, time, k)
+        elif not few and (steps == 1).mean() >= 0.95:
             draft.be("counter", "counts up by one", k)
         elif not few and _is_total(numbers, np.delete(whole, at, axis=1)):
             draft.be("total", "the sum or mean of others", k)
@@ -458,6 +474,18 @@ def by_values(draft: Draft, taxels: list[int], text: Text) -> list[int]:
         what = ", ".join(f"{draft.called(k)} ({draft.roles[k].why})" for k in asked[:8])
         draft.ask(f"may be no taxels: {what}", "leave_out keep", choices, *asked)
     return [k for k in taxels if not draft.roles[k].is_left]
+
+
+def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
+    """Leave out a column that ascends evenly beside the time; where the time repeats, ask which it is."""
+    draft.be("counter" if draft.fit.counts(other) else "no taxel", "ascends evenly, as a time does", other)
+    if 2 * len(set(draft.fit.cells(time))) <= len(draft.fit.body) and not draft.fit.counts(other):
+        old, new = draft.called(time), draft.called(other)
+        choices: dict[str, Changes] = {
+            f"{new} is the time": {"time_column": new, "time_unit": None, "read": [new], "left": [old]},
+            f"{old} is the time": {"time_column": old},
+        }
+        draft.ask(f"column {old} repeats, and {new} ascends evenly", "time_column", choices, time, other)
 
 
 def _is_total(own: NDArray[np.float64], others: NDArray[np.float64]) -> bool:

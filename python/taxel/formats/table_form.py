@@ -47,6 +47,8 @@ _ABOVE_FRAME = re.compile(
     re.IGNORECASE,
 )
 _ONE_DOCUMENT = "is one document of JSON; save a line of JSON per frame, or a .csv"
+#: An array as NumPy prints it that has more values than it prints.
+_CUT = re.compile(r"\d\.?[\s,]+\.\.\.[\s,]+[-+.\d]")
 _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 #: The mark of a comment before names.
 _COMMENT = re.compile(r"(?:#+|(?:[%;!*]|//)+(?=\s|$))\s*")
@@ -100,8 +102,16 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
         (stated.frame_begin or "", [stated.frame_time or ""]) if stated.has_lines else _begin_of_frames(lines)
     )
     is_begin = [bool(begin) and line.lstrip().startswith(begin) for line in lines]
-    is_above = [above or k < stated.skip_lines for k, above in enumerate(is_begin)]
+    above = is_begin.index(True) if any(is_begin) else 0
+    is_above = [
+        is_first or k < stated.skip_lines or (k < above and any(map(str.isdigit, line)))
+        for k, (is_first, line) in enumerate(zip(is_begin, lines, strict=True))
+    ]
     shown_lines = ["" if above else line for line, above in zip(lines, is_above, strict=True)]
+    cut = next((k for k, line in enumerate(lines) if "..." in line and _CUT.search(line)), None)
+    if cut is not None:
+        right = "save them whole, as numpy.set_printoptions(threshold=sys.maxsize) prints them"
+        raise unreadable(f"an array is cut by ..., and its values are lost; {right}", text.path, line=cut + 1)
     draft = _draft(text, layout, shown_lines)
     _frames(draft, lines, is_begin, begin, [unit for unit in units if unit])
     time = time_of(draft)
@@ -117,7 +127,7 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
         ask_for_lines_of_one_time(draft, time)
     are = are_events(draft, time, taxels)
     if not are and draft.table.taxel_column is None:
-        taxels = by_values(draft, taxels, text)
+        taxels = by_values(draft, time, taxels, text)
     if not draft.is_stated("leave_out", "keep"):
         left = (k for k, role in enumerate(draft.roles) if role.is_left and role.certainty != SURE)
         of_taxel = places_of(draft.names, "", draft.table.taxel_column) if draft.table.taxel_column else ()
