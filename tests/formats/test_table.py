@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
@@ -476,6 +478,58 @@ def test_utf_16_without_its_mark_and_damaged_gzip_are_refused(tmp_path: Path, co
         opened(tmp_path, "time,a\n0,1\n".encode(code))
     with refused(FormatError, place=Place("b.csv.gz")):
         opened(tmp_path, gzip.compress(b"t_s,a\n" + b"0,1\n" * 9999)[:40], name="b.csv.gz")
+
+
+#: How two sensors write a line each in turn, and the sources that they are.
+IN_TURN = {
+    "keys": ("{t},L:{a},2\n{u},R:900,{b}\n", ("L", "R")),
+    "JSON": ('{{"t":{t},"left":[{a},2]}}\n{{"t":{u},"right":[900,{b}]}}\n', ("left", "right")),
+    "one more value": ("t:{t} thumb:{a} 2\nt:{u} palm:900 {b} 7\n", ("thumb", "palm")),
+    "prefixes": ("left: {t},{a},2\nright: {u},900,{b}\n", ("left", "right")),
+}
+
+
+@given(
+    kind=st.sampled_from([*IN_TURN]),
+    rows=st.lists(st.tuples(st.integers(0, 9), st.integers(0, 900)), min_size=12, max_size=40),
+    odd=st.booleans(),
+)
+def test_sensors_that_lines_name_are_sources(
+    kind: str, rows: list[tuple[int, int]], odd: bool, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    line, names = IN_TURN[kind]
+    lines = [line.format(t=20 * k, u=20 * k + 5, a=a, b=b) for k, (a, b) in enumerate(rows)]
+    text = "".join([*lines[:5], *["Sensor ready\n"] * odd, *lines[5:]])
+    layout = '[table]\ntime_column = 1\ntime_unit = "ms"\n'
+    found = opened(tmp_path_factory.mktemp("turns"), text, layout)
+    assert set(found.sources) == {*names}
+    for at, (name, begin) in enumerate(zip(names, (0, 5000), strict=True)):
+        t, values = frames(found, name)
+        assert t == [begin + 20_000 * k for k in range(len(rows))]
+        assert [row[at] for row in values] == [row[at] for row in rows]
+
+
+def test_lines_that_name_one_sensor_or_a_state_now_and_then_are_of_one(tmp_path: Path) -> None:
+    text = "".join(f"t:{10 * k} a:{k % 7} b:{k % 5}\n" + "battery: 87\n" * (k % 20 == 9) for k in range(60))
+    assert list(opened(tmp_path, text, '[table]\ntime_unit = "ms"\n').sources) == [""]
+
+
+def test_sheets_with_the_same_columns_are_sources(tmp_path: Path) -> None:
+    pytest.importorskip("openpyxl")
+    path = tmp_path / "a.xlsx"
+    with pd.ExcelWriter(path) as book:
+        for name, more in (("walk", 0), ("run", 9)):
+            sheet = pd.DataFrame({"t_s": np.arange(30) / 50, "a": np.arange(30) % 7 + more})
+            sheet.to_excel(book, sheet_name=name, index=False)
+        pd.DataFrame({"subject": ["A"], "age": [31]}).to_excel(book, sheet_name="about", index=False)
+    found = opened_by(read_table, path, None)
+    assert list(found.sources) == ["walk", "run"]
+    assert frames(found, "run")[1] == [[k % 7 + 9] for k in range(30)]
+    assert "other sheets: about" in found.lost
+    found = opened_by(read_table, path, '[table]\nsheet = "run"\n')
+    assert frames(found)[1][0] == [9]
+    with refused(FormatError, place=Place("a.xlsx")):
+        opened_by(read_table, path, '[table]\nsheet = "jump"\n')
 
 
 def test_parquet_is_read_as_it_is_typed(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import gzip
 import io
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from itertools import islice
@@ -55,11 +55,24 @@ class Text:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self._name = path, ""
+        self._takes: Callable[[str], bool] | None = None
         self.is_file = path.suffix.lower() not in (*SHEETS, *ARRAYS) and not self._rows
         self._encoding = ""
         #: Whether the last of the lines that were read has an end, and whether more follow those of the head.
         self.ends_in_line, self.goes_on = True, False
+
+    def of_sheet(self, name: str) -> Text:
+        """Return the text of one sheet of a workbook."""
+        part = Text(self.path)
+        part.sheets, part._name = self.sheets, name
+        return part
+
+    def of_lines(self, takes: Callable[[str], bool]) -> Text:
+        """Return the text in which all lines are empty but those that it takes."""
+        part = Text(self.path)
+        part._takes = takes
+        return part
 
     @property
     def encoding(self) -> str:
@@ -94,7 +107,8 @@ class Text:
             try:
                 for line in text:
                     self.ends_in_line = line.endswith("\n")
-                    yield line.rstrip("\n")
+                    bare = line.rstrip("\n")
+                    yield bare if self._takes is None or self._takes(bare) else ""
                     count += 1
                 return
             except UnicodeDecodeError as error:
@@ -125,7 +139,8 @@ class Text:
             for place in range(0, max(0, rest), max(1, rest // min(_SPREAD, 1 + _MORE // longest))):
                 file.seek(begin + place)
                 found += file.read(longest).split(b"\n")[1:2]
-        return [line.decode(self.encoding, "replace").rstrip("\r") for line in found]
+        lines = (line.decode(self.encoding, "replace").rstrip("\r") for line in found)
+        return [line for line in lines if self._takes is None or self._takes(line)]
 
     @contextmanager
     def opened(self) -> Iterator[IO[str]]:
@@ -203,12 +218,21 @@ class Text:
             records = read_arrays(self.path, [name])[name].ravel()
             columns = {name: _cells(column) for name, column in columns_of(records)}
             return str(pd.DataFrame(columns).to_csv(sep="\t", index=False))
+        return str(
+            self.sheets[self._name or next(iter(self.sheets))].map(_cell).to_csv(sep="\t", index=False, header=False)
+        )
+
+    @cached_property
+    def sheets(self) -> dict[str, Any]:
+        """The DataFrames of a workbook's sheets by their names; none of any other file."""
+        if self.path.suffix.lower() not in SHEETS or self.typed is not None:
+            return {}
+        import pandas as pd  # noqa: PLC0415  takes long
+
         try:
-            sheets = pd.read_excel(self.path, sheet_name=None, header=None, dtype=object)
+            return dict(pd.read_excel(self.path, sheet_name=None, header=None, dtype=object))
         except Exception as error:  # of zipfile, of XML
             raise self._damaged(error) from None
-        largest = max(sheets.values(), key=lambda sheet: sheet.notna().to_numpy().sum(), default=pd.DataFrame())
-        return str(largest.map(_cell).to_csv(sep="\t", index=False, header=False))
 
 
 def _columns_in(name: str, column: Any) -> Iterator[tuple[str, Any]]:

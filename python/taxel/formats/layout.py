@@ -63,6 +63,8 @@ class Table:
     taxel_column : str or int, optional
         A column that says which taxel a line is of, whose reading is in the only other column: the lines of one time
         are a frame. "A+B": two columns, the row and the column of the taxel.
+    sheet : str, optional
+        The sheet of a workbook that is read; default: those with the columns of the largest, each a source.
     lines : {"plain", "marked", "json", "hex"}
         "marked": brackets, quotes, arrows and ``NAME:`` are between cells too, and a unit may be behind a number;
         "json": a line is an object or a list of JSON, whose columns have the names of its keys; "hex": cells are
@@ -96,6 +98,7 @@ class Table:
     label_column: str | int | None = None
     by: str | int | None = None
     taxel_column: str | int | None = None
+    sheet: str | None = None
     lines: str = "plain"
     frame_lines: int | None = None
     frame_end: str | None = None
@@ -113,7 +116,7 @@ class Table:
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         integer("skip_lines", self.skip_lines, 0)
         _check_columns(self, "time_column", "label_column", "by", "taxel_column", "leave_out")
-        for name in ("keep", "frame_begin"):
+        for name in ("keep", "sheet", "frame_begin"):
             if getattr(self, name) is not None:
                 text(name, getattr(self, name))
         for cell in self.missing_texts:

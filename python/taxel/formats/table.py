@@ -28,6 +28,7 @@ from taxel.formats.form import Form
 from taxel.formats.layout import Layout
 from taxel.formats.lines import MISSING, OTHER, USUAL, WITH_TEXT, WITH_THOUSANDS, OddLines, is_number, read_line
 from taxel.formats.opened import readers_of, sources_of
+from taxel.formats.parts import parts_of
 from taxel.formats.table_columns import EVENT_COLUMNS
 from taxel.formats.table_form import form_of
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
@@ -110,16 +111,30 @@ def read_table(
     FormatError : no table, one that differs from its layout, or one that can be read in two ways (prints both)
     ImportError : the extra ``tables`` is not installed
     """
-    text = Text(path)
+    parts, others = parts_of(Text(path), layout.table)
+    more = [f"other sheets: {', '.join(others)}"] * bool(others)
+    return [each for name, text in parts.items() for each in _read_part(name, text, layout, array, label_column, more)]
+
+
+def _read_part(
+    part: str,
+    text: Text,
+    layout: Layout,
+    array: Array | None,
+    label_column: str | int | None,
+    more: Sequence[str],
+) -> list[InMemory]:
+    """Return a reader of each source of one of the tables of a file; `more` is what of the file is not read."""
+    path = text.path
     form, full = form_of(text, layout, label_column)
     how, columns, sources = form.table, form.columns, dict[str, Frames | Events]()
     rows = read_rows(text, form)
     read = {*columns.times, columns.label, columns.by, *columns.taxel, *columns.taxels}
     left = [form.called(k) for k in range(len(form.names)) if k not in read]
-    lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
-    said, notes = [*form.said, *rows.odd.said()], dict[str, list[Note]]()
+    lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said(), *more]
+    said, notes = [*form.said, *rows.odd.said(), *more], dict[str, list[Note]]()
     if how.events:
-        sources = {"": _events(path, full, form, rows, array)}
+        sources = {part: _events(path, full, form, rows, array)}
     else:
         values, names = _frames_of_lines(path, full, form, rows, said), [form.names[k] for k in columns.taxels]
         is_found = layout.stated.isdisjoint(("leave_out", "keep")) and values.shape[1] == 1
@@ -141,7 +156,7 @@ def read_table(
                 t, order = in_order(path, beside["time"], form.unit_of_times, said)
             if order is not None:
                 of_part, beside = of_part[order], beside.iloc[order]
-            own = dict(sources_of(path, full, key, of_part, t, names if any(names) else None))
+            own = dict(sources_of(path, full, f"{part} {key}".strip(), of_part, t, names if any(names) else None))
             sources |= own
             notes |= dict.fromkeys(own, _labels(form, beside, t))
     timed = rows.times is not None
