@@ -577,3 +577,4 @@ def test_a_table_of_events_opens_as_events(tmp_path: Path) -> None:
     found = opened(tmp_path, "x,y,p,t_us\n1,2,1,10\n3,4,0,10\n5,6,1,30\n")
     expected = Events([10, 10, 30], [1, 3, 5], [2, 4, 6], [True, False, True], array=Array.thesis())
     assert found.sources == {"": expected}
+    assert "64 x 64 taxels assumed" in found.said

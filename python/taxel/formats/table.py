@@ -135,6 +135,9 @@ def _read_part(
     said, notes = [*form.said, *rows.odd.said(), *more], dict[str, list[Note]]()
     if how.events:
         sources = {part: _events(path, full, form, rows, array)}
+        shape = sources[part].array.shape
+        if array is None and layout.rows is None:
+            said.append(f"{shape[0]} x {shape[1]} taxels assumed, which the table does not state")
     else:
         values, names = _frames_of_lines(path, full, form, rows, said), [form.names[k] for k in columns.taxels]
         is_found = layout.stated.isdisjoint(("leave_out", "keep")) and values.shape[1] == 1
