@@ -391,8 +391,15 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
     layout = tmp_path / "all.layout.toml"
     layout.write_text('[table]\ntime_column = 1\ntime_unit = "ms"\nleave_out = []\n')
     events = [{"slip": [note.t for note in recording.notes if note.text == "slipped 1"]}]
-    warned = taxel.train(taxel.open(tmp_path / "a.csv", layout=layout), events).warnings
-    assert any("slipped alone changes with the labels" in line for line in warned)
+    steps = list[str]()
+    for late in (0, 30_000):
+        late_events = [{"slip": [t + late for t in events[0]["slip"]]}]
+        opened_all = taxel.open(tmp_path / "a.csv", layout=layout)
+        steps.clear()
+        warned = taxel.train(opened_all, late_events, progress=lambda step, *_: steps.append(step)).warnings
+        assert any("slipped alone changes with the labels" in line for line in warned)
+        # It is said before the training begins.
+        assert "slipped alone changes with the labels" in steps[0]
     assert not any("with the labels" in line for line in taxel.train(recording, events).warnings)
     np.save(tmp_path / "b.npy", np.zeros((9, 2)))
     with refused(taxel.ProblemError, "label_column"):
