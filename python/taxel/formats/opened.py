@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +65,7 @@ def readers_of(
         timed=timed,
         lost=tuple(lost),
         layout=of_layout(layout),
-        roles=tuple(role.to_dict() for role in roles),
+        roles=tuple(map(asdict, roles)),
     )
 
     def named(name: str) -> Facts:

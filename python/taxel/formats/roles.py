@@ -7,7 +7,7 @@ the page are views of it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, TypeAlias
 
@@ -54,10 +54,6 @@ class Role:
         """Whether it is none of what is read as values or times."""
         return self.role not in ("taxel", "time")
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values for JSON."""
-        return asdict(self) | {"first": list(self.first)}
-
 
 @dataclass(frozen=True)
 class Question:
@@ -69,10 +65,6 @@ class Question:
     why: str
     keys: frozenset[str]
     choices: Mapping[str, Changes] = field(default_factory=dict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values for JSON."""
-        return {"why": self.why, "keys": sorted(self.keys), "choices": {k: dict(v) for k, v in self.choices.items()}}
 
 
 def lines_of(roles: Sequence[Role]) -> Iterator[str]:

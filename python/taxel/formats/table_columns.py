@@ -128,7 +128,7 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     is_two = "+" in str(draft.table.time_column or "") and draft.is_stated("time_column")
     if not draft.is_stated("time_unit"):
         is_text = fit.types[column] == "time"
-        draft.set(time_unit="s" if is_two else ISO if is_text else _unit_of_time(draft, column))
+        draft.set(time_unit=ISO if is_text else "s" if is_two else _unit_of_time(draft, column))
         if is_text and all(map(is_of_two_numbers, fit.cells(column))):
             example = fit.cells(column)[-1]
             why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
@@ -435,6 +435,7 @@ def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> 
     series = [k for k in taxels if not draft.names[k] or counts[stems[k]] >= _SERIES]
     alone = [k for k in taxels if draft.fit.types[k] == "number" and k not in {*series}]
     alone += [k for k in series[-1:] if not draft.names[k]]
+    alone = alone if len(alone) <= _BLOCKS else []
     are_axes = column_names.axes_of([draft.names[k] for k in taxels]) is not None
     if draft.is_stated("leave_out", "keep") or len(taxels) < 3 or are_axes or draft.table.has_lines:
         return taxels
