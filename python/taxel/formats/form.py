@@ -87,9 +87,7 @@ class Form:
         label, by = (
             place_of(names, key, getattr(how, key)) if getattr(how, key) else None for key in ("label_column", "by")
         )
-        counts = Counter(names)
-        at = {name: k for k, name in enumerate(names) if counts[name] == 1}
-        left = {at[column] if column in at else place_of(names, "leave_out", column) for column in how.leave_out}
+        left = left_out(names, how)
         twice = next((k for k in times if k in left), None)
         if twice is not None:
             raise ProblemError(f"column {shown(names[twice])} is the time_column, but is also in leave_out")
@@ -197,6 +195,18 @@ class Form:
                 of_time = "with a time that is no number" if k in self.columns.times else WITH_TEXT
                 return WITH_THOUSANDS if has_thousands else of_time
         return "" if all(is_time(cells[k]) for k in self._texts) else "without a time"
+
+
+def left_out(names: Sequence[str], how: Table) -> set[int]:
+    """Return the places of the columns that a table leaves out.
+
+    Raises
+    ------
+    ProblemError : there is no such column
+    """
+    counts = Counter(names)
+    at = {name: k for k, name in enumerate(names) if counts[name] == 1}
+    return {at[column] if column in at else place_of(names, "leave_out", column) for column in how.leave_out}
 
 
 def place_of(names: Sequence[str], key: str, column: str | int) -> int:

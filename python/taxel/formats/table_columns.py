@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from taxel._base.table_text import Text
 from taxel.formats import column_names
 from taxel.formats.column_names import time_unit
-from taxel.formats.form import place_of, places_of
+from taxel.formats.form import left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
@@ -64,11 +64,10 @@ class Draft:
         """Why each column is left out that is."""
         return {k: role.why for k, role in enumerate(self.roles) if role.is_left}
 
-    @property
+    @cached_property
     def stated_left(self) -> set[int]:
         """The columns that the layout leaves out."""
-        given = self.layout.table.leave_out if self.layout.table is not None else ()
-        return {place_of(self.names, "leave_out", column) for column in given}
+        return set() if self.layout.table is None else left_out(self.names, self.layout.table)
 
     def is_stated(self, *keys: str) -> bool:
         """Return whether the layout states one of these keys."""
