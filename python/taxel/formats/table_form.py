@@ -335,7 +335,7 @@ def _numbered(draft: Draft) -> Draft:
     if len(first) == fit.count >= 4:
         first_frame = fit.lines[fit.body[0]][0]
         choices = {"a frame": {"skip_lines": first_frame}, "numbers of columns": {"skip_lines": below}}
-        draft.ask("the first line is 1, 2, 3 ...", "skip_lines", choices)
+        draft.ask("the first line is 1, 2, 3 ...", "skip_lines rows", choices)
     return draft
 
 
