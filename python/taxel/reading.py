@@ -245,6 +245,8 @@ class Facts:
         Whether the last data are missing.
     layout : str
         The text of a layout file by which a table or array of another program was read, complete.
+    roles : tuple of mapping
+        What each column or axis of such a file is (`taxel.formats.roles.Role`).
     labels_of : str
         The quantity of plain rules whose thresholds its notes are, as they were derived from it; "" if they were not.
     """
@@ -268,6 +270,7 @@ class Facts:
     lost: tuple[str, ...] = ()
     truncated: bool = False
     layout: str = ""
+    roles: tuple[Mapping[str, Any], ...] = ()
     labels_of: str = ""
 
     def __post_init__(self) -> None:

@@ -14,6 +14,7 @@ from rosbags.typesys.store import Typestore
 #: 2026-11-23 in ns, near to what robots write.
 BEGIN_NS = 1_795_000_000_000_000_000
 PALM, HAND, SKIN = "skins_msgs/msg/Palm", "skins_msgs/msg/Hand", "skins_msgs/msg/Skin"
+STATE, SIDE = "skins_msgs/msg/State", "skins_msgs/msg/Side"
 #: Custom messages: a palm of 24 x 32 where less means more pressure, fingers, and a list of sensors.
 DEFINITIONS = {
     PALM: "std_msgs/Header header\nint16[768] taxels\n",
@@ -21,6 +22,10 @@ DEFINITIONS = {
     SKIN: "skins_msgs/Patch[] patches\n",
     "skins_msgs/msg/Patch": "uint8 number\nuint16[] taxels\nskins_msgs/Force[] forces\n",
     "skins_msgs/msg/Force": "float32 x\nfloat32 z\n",
+    STATE: "std_msgs/Header header\nskins_msgs/Channel[] sensors\n",
+    "skins_msgs/msg/Channel": "string name\nfloat32[] values\n",
+    SIDE: "string hand\nskins_msgs/Labelled skin\n",
+    "skins_msgs/msg/Labelled": "string[] channels\nfloat32[] values\n",
 }
 
 #: A message, by the types of a store: what its constructor is called with.
@@ -115,6 +120,22 @@ def skin(patches: Sequence[tuple[Sequence[int], Sequence[float]]]) -> Make:
         return types[SKIN](made)
 
     return make
+
+
+def state(channels: dict[str, Sequence[float]]) -> Make:
+    """Return the maker of a message of channels, each with its name, in their order."""
+
+    def make(types: dict[str, Any], ns: int) -> Any:
+        made = [types["skins_msgs/msg/Channel"](name, np.array(v, np.float32)) for name, v in channels.items()]
+        return types[STATE](header(types, ns), made)
+
+    return make
+
+
+def side(hand: str, channels: dict[str, float]) -> Make:
+    """Return the maker of a message of a hand, whose channels are named within it."""
+    values = np.array([*channels.values()], np.float32)
+    return lambda types, _: types[SIDE](hand, types["skins_msgs/msg/Labelled"]([*channels], values))
 
 
 #: One message: topic, type, the bag's time and the stamp in ms after the beginning (None: a stamp of 0), its maker.

@@ -143,12 +143,27 @@ def test_what_holds_no_numbers_is_refused(array: np.ndarray, tmp_path: Path) -> 
         opened(tmp_path / "a.npy", "rate_hz = 1\n")
 
 
+def test_an_object_of_matlab_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def whosmat(path: Path) -> None:
+        raise TypeError("'NoneType' object is not iterable")
+
+    (tmp_path / "a.mat").write_bytes(b"MATLAB 5.0 MAT-file")
+    monkeypatch.setattr("scipy.io.whosmat", whosmat)
+    with refused(FormatError, place=Place("a.mat")) as caught:
+        taxel.open(tmp_path / "a.mat")
+    assert "writetable" in str(caught.value)
+
+
 def test_other_programs_files_are_told_what_to_save_instead(tmp_path: Path) -> None:
     for ending in (".xls", ".pkl", ".pt", ".tdms", ".c3d"):
         (tmp_path / f"a{ending}").write_bytes(b"\x80\x04\x95")
         with refused(FormatError, place=Place(f"a{ending}")) as caught:
             taxel.open(tmp_path / f"a{ending}")
         assert "save" in str(caught.value) or "export" in str(caught.value)
+    (tmp_path / "a.zarr").mkdir()
+    for opens in (taxel.open, taxel.open_all):
+        with refused(FormatError, place=Place("a.zarr")):
+            opens(tmp_path / "a.zarr")
     (tmp_path / "a.json").write_text('{\n "p": [1, 2]\n}\n')
     with refused(FormatError, place=Place("a.json")):
         taxel.open(tmp_path / "a.json")

@@ -54,7 +54,7 @@ def test_taxels_keep_the_names_of_their_columns(tmp_path: Path, time: int | str 
     text = ",".join([*(["zeit"] if time else []), *names]) + "\n" + lines(rows)
     (tmp_path / "step.csv").write_bytes(text.encode("latin-1"))
     column = "" if time is None else f"time_column = {time!r}\n".replace("'", '"')
-    (tmp_path / "step.layout.toml").write_text(f"{shape}[table]\n{column}")
+    (tmp_path / "step.layout.toml").write_text(f"{shape}[table]\n{column}frame_lines = 1\n")
     recording = taxel.open(tmp_path / "step.csv")
     assert recording.array.names == called
     for ending in (".mcap", ".npz", ".h5"):
@@ -113,14 +113,15 @@ def test_a_value_that_does_not_fit_names_its_place(tmp_path: Path, at: Any, name
     values = np.zeros((5, 2, 3) if len(at) == 3 else (5, 6))
     values[at] = value
     np.save(tmp_path / "a.npy", values)
-    (tmp_path / "a.layout.toml").write_text("rate_hz = 10\n")
+    axes = "time taxel" if values.ndim == 2 else "time row column"
+    (tmp_path / "a.layout.toml").write_text(f'rate_hz = 10\n[data]\naxes = "{axes}"\n')
     with pytest.raises(FormatError, match=rf"a\.npy.*{named}: must fit 32 bits"):
         taxel.open(tmp_path / "a.npy")
 
 
 def test_a_given_sensor_lays_out_arrays_of_somebody_else_and_another_is_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", VALUES)
-    (tmp_path / "a.layout.toml").write_text("rate_hz = 10")
+    (tmp_path / "a.layout.toml").write_text('rate_hz = 10\n[data]\naxes = "time taxel"\n')
     for array in (Array(2, 3), Array(2, 3, 4.5), Array(1, 6, 4.5)):
         opened = taxel.open(tmp_path / "a.npy", array=array)
         assert (opened.array.shape, opened.array.pitch_mm) == (array.shape, array.pitch_mm)
@@ -173,11 +174,11 @@ def test_a_layout_says_what_our_own_files_lack(tmp_path: Path) -> None:
         ("[table]\nsep = ';'", r"table\.sep is not known: must be one of separator, decimal, skip_lines"),
         ("[ros]\ntopics = 'a'", r"ros\.topics is not known"),
         ("rows = 2", "rows and columns: give both or neither"),
-        ("rows = 2\ncolumns = 4", "2 x 4 taxels"),
+        ("rows = 2\ncolumns = 4\n[table]\ntime_column = 0", "2 x 4 taxels"),
         ("rows = 'two'\ncolumns = 3", "rows"),
         ("pitch_mm = -1", "pitch_mm is -1: must be above 0"),
         ("pitch_mm = 2\n[places]\nx = [1]\ny = [1]", "both given"),
-        ("[places]\nx = [1, 2]\ny = [1, 2]", "must be"),
+        ("[places]\nx = [1, 2]\ny = [1, 2]\n[table]\ntime_column = 0", "must be"),
         ("[places]\nx = [1, 2]", r"\[places\]: y is missing"),
         ("[source]\nbaud = 9600", r"\[source\]: place is missing"),
         ("side = 'up'", "side"),
@@ -351,7 +352,7 @@ def test_zeros_before_frames_without_times_or_before_events_are_refused(tmp_path
     with pytest.raises(
         FormatError, match=r"zeros_before_s needs times, but \S+ has none; to give times, write rate_hz"
     ):
-        table(tmp_path, lines(np.ones((5, 6))), "zeros_before_s = 0.5")
+        table(tmp_path, lines(np.ones((5, 6))), "zeros_before_s = 0.5\n[table]\ntime_column = 0")
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "board.mcap")
     (tmp_path / "given.toml").write_text("zeros_before_s = 0.5")

@@ -84,7 +84,7 @@ def test_the_unit_of_stamps_is_that_in_which_lines_arrive() -> None:
         (repeated(lambda k: f"{k},{['left', 'right'][k % 2]},7,7"), {}),
         (["1,2"] * 5, {"columns": ["a", "b", "c"]}),
         (["1,2"] * 5, {"time": "3:ms"}),
-        (["1,2"] * 5, {"time": "1:d"}),
+        (["1,2"] * 5, {"time": "1:q"}),
         (["1,2"] * 5, {"leave_out": ["c"]}),
         (["1,2"] * 5, {"leave_out": ["1", "2"]}),
     ],

@@ -364,7 +364,34 @@ def test_named_channels_are_taken_by_name_and_a_field_splits(tmp_path: Path, mon
     opened = taxel.open(bag, topic="/joints")
     assert opened.frames().values[:, 0].tolist() == [[1, 2], [3, 4]]
     assert opened.array.names == ("thumb", "index")
+    # Messages of both hands are not mixed.
+    with pytest.raises(FormatError, match="left, right in turn \\(hand\\): write by = 'hand'"):
+        taxel.open(bag, topic="/touch")
+    (tmp_path / "a.layout.toml").write_text('[ros]\ntopic = "/touch"\nby = ""\n')
+    assert len(taxel.open(bag).frames()) == 3
     (tmp_path / "a.layout.toml").write_text('[ros]\ntopic = "/touch"\nby = "hand"\n')
     split = taxel.open(bag)
     assert list(split.sources) == ["touch_left", "touch_right"]
     assert split.sources["touch_left"].frames().values[:, 0].tolist() == [[5, 6], [9, 9]]
+
+
+def test_channels_are_taken_by_name_wherever_the_names_are(tmp_path: Path) -> None:
+    channels = {"ff": [100, 1], "mf": [200, 2], "rf": [301, 3]}
+    turned = dict(reversed(channels.items()))
+    scalars = {name: values[0] for name, values in channels.items()}
+    bag = bags.write(
+        tmp_path / "a.mcap",
+        [
+            *(("/state", bags.STATE, 10 * k, 10 * k, bags.state([channels, turned][k % 2])) for k in range(6)),
+            *(
+                ("/side", bags.SIDE, 10 * k, None, bags.side("left", [scalars, dict(reversed(scalars.items()))][k % 2]))
+                for k in range(6)
+            ),
+        ],
+    )
+    found = taxel.open(bag, topic="/state")
+    assert found.array.names == ("ff[0]", "ff[1]", "mf[0]", "mf[1]", "rf[0]", "rf[1]")
+    assert found.frames().values[:, 0].tolist() == [[100, 1, 200, 2, 301, 3]] * 6
+    found = taxel.open(bag, topic="/side")
+    assert found.array.names == ("ff", "mf", "rf")
+    assert found.frames().values[:, 0].tolist() == [[100, 200, 301]] * 6

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
@@ -165,6 +167,51 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
         [0, 10_000],
         [[1], [3]],
     ),
+    "milliseconds behind a comma": (
+        "".join(f"2024-05-01 10:00:0{k // 4},{250 * (k % 4):03},{k % 3}\n" for k in range(9)),
+        [1_714_557_600_000_000 + 250_000 * k for k in range(9)],
+        [[k % 3] for k in range(9)],
+    ),
+    "numbers as texts have them": (
+        "t_ms;a;b\n0;1 200,5;\N{MINUS SIGN}3\n10;1 201,5;\N{MINUS SIGN}4,5\n20;13 202,5;6\n",
+        [0, 10_000, 20_000],
+        [[1200.5, -3], [1201.5, -4.5], [13202.5, 6]],
+    ),
+    "cells without a value": (
+        "t_ms,a,b\n" + "".join(f"{10 * k},{('#N/A', 'inf', '?', '#DIV/0!', 1)[k % 5]},{k}\n" for k in range(9)),
+        [10_000 * k for k in range(9)],
+        [[1 if k % 5 == 4 else np.nan, k] for k in range(9)],
+    ),
+    "a cell that is no number is missing": (
+        "t_ms,a,b\n" + "".join(f"{10 * k},{'wet' if k == 7 else k % 4},{k % 3}\n" for k in range(30)),
+        [10_000 * k for k in range(30)],
+        [[np.nan if k == 7 else k % 4, k % 3] for k in range(30)],
+    ),
+    "empty lines of a spreadsheet": (
+        "t_ms;a;b\n0;1;2\n10;1;3\n20;2;3\n" + ";;\n" * 9,
+        [0, 10_000, 20_000],
+        [[1, 2], [1, 3], [2, 3]],
+    ),
+    "numbers above frames": (
+        "name,,\n3,,\n,,\nFrame 0 (0.00 ms),,\n0,1,2\n0,1,3\n,,\nFrame 1 (2.00 ms),,\n0,1,2\n0,1,4\n",
+        [0, 2000],
+        [[0, 1, 2, 0, 1, 3], [0, 1, 2, 0, 1, 4]],
+    ),
+    "days of a spreadsheet": (
+        "time,a\n" + "".join(f"{45413 + k / 86400:.8f},{k % 3}\n" for k in range(4)),
+        [1_714_521_600_000_000, 1_714_521_600_999_648, 1_714_521_602_000_160, 1_714_521_602_999_808],
+        [[0], [1], [2], [0]],
+    ),
+    "days of MATLAB": (
+        "datenum,a\n" + "".join(f"{739373 + k / 4},{k % 3}\n" for k in range(3)),
+        [1_714_521_600_000_000 + 21_600_000_000 * k for k in range(3)],
+        [[0], [1], [2]],
+    ),
+    "a time that repeats before a pause": (
+        "t_ms,a\n0,1\n10,1\n20,1\n20,2\n5000,1\n5010,1\n",
+        [0, 10_000, 20_000, 30_000, 5_000_000, 5_010_000],
+        [[1], [1], [1], [2], [1], [1]],
+    ),
     "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
 }
 
@@ -211,7 +258,7 @@ def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, tex
         ("0,5\n0,7\n0,9\n", ["", 'decimal = ","']),
         ("x,y,p,t\n1,2,1,100\n3,4,0,230\n5,6,1,400\n", ['time_unit = "us"', 'time_unit = "ms"']),
         ("7,5,1\n2,9,4\n4,4,2\n", ["", "frame_lines = 3"]),
-        (",0,1\n" + "".join(f"{k},{k % 3},{k % 4}\n" for k in range(9)), ["skip_lines = 1", "skip_lines = 1"]),
+        (",0,1\n" + "".join(f"{k},{k % 3},{k % 4}\n" for k in range(9)), ["skip_lines = 1"] * 3),
         ("01 10 20\n02 11 21\n", ["", 'lines = "hex"']),
         ("0,0,left,1,2\n5,1,right,8,9\n10,0,left,1,2\n", ["by = 3", "leave_out = [2, 3]"]),
         ("t_ms,hand,a\n0,1,5\n10,2,7\n20,1,5\n", ['by = "hand"', 'leave_out = ["hand"]']),
@@ -342,10 +389,17 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
     assert {note.text for note in recording.notes} == {"slipped 0", "slipped 1"}
     assert [note.t for note in recording.notes] == [500_000 * k for k in range(1, 24)]
     layout = tmp_path / "all.layout.toml"
-    layout.write_text('[table]\ntime_column = 1\ntime_unit = "ms"\n')
+    layout.write_text('[table]\ntime_column = 1\ntime_unit = "ms"\nleave_out = []\n')
     events = [{"slip": [note.t for note in recording.notes if note.text == "slipped 1"]}]
-    warned = taxel.train(taxel.open(tmp_path / "a.csv", layout=layout), events).warnings
-    assert any("slipped alone changes with the labels" in line for line in warned)
+    steps = list[str]()
+    for late in (0, 30_000):
+        late_events = [{"slip": [t + late for t in events[0]["slip"]]}]
+        opened_all = taxel.open(tmp_path / "a.csv", layout=layout)
+        steps.clear()
+        warned = taxel.train(opened_all, late_events, progress=lambda step, *_: steps.append(step)).warnings
+        assert any("slipped alone changes with the labels" in line for line in warned)
+        # It is said before the training begins.
+        assert "slipped alone changes with the labels" in steps[0]
     assert not any("with the labels" in line for line in taxel.train(recording, events).warnings)
     np.save(tmp_path / "b.npy", np.zeros((9, 2)))
     with refused(taxel.ProblemError, "label_column"):
@@ -356,7 +410,7 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
     ("text", "layout", "line"),
     [
         ("t_ms,a,b\n0,1,2\n10\n20\n30\n40,1,2\n50,1,3\n60,1,3\n", None, 3),
-        ("t_ms,a\n0,1\n10,x\n20,y\n30,z\n40,1\n", "[table]\ntime_column = 1\n", 3),
+        ("t_ms,a\n0,1\n10,x\n20,y\n30,z\n40,1\n", "[table]\ntime_column = 1\n", None),
         ("a,b\n1,2\n", "[table]\ncolumns = ['a', 'b', 'c']", 1),
         ("a b c\nd e f\n", None, None),
         ("t_ms;a\n0;1,5\n10;1.234,5\n20;2,5\n", "[table]\nseparator = ';'\ndecimal = ','\ntime_column = 1\n", 3),
@@ -366,11 +420,13 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
         ("1,2\n3,4\n", "[table]\ntime_column = 3", None),
         ("t,a\n0,1\n", "[table]\nleave_out = ['b']", None),
         ("t,a\n0,1\n", "[table]\nseparator = ';'", 1),
-        ("time,a\n0,1\n1,2\n", "[table]\nlines = 'plain'", 1),
         ("t_s,a\n0,1e39\n1,2\n", None, 2),
         ("t_s,a\n0,1\n9e99,2\n", None, None),
-        ("1,2\n3,4\n\n5,6\n", "[table]\nframe_lines = 3", 4),
+        ("1,2\n3,4\n\n5,6\n", "[table]\nseparator = ','\nframe_lines = 3", 4),
         ('{"a": {"t": 0, "p": [1, 2]}, "b": {"t": 1, "p": [3, 4]}}\n', None, None),
+        ("t_ms,a\n" + "1.71E+12,1\n1.71E+12,2\n" * 10, None, None),
+        ('t,p\n0.0,"[1 2 3 ... 7 8 9]"\n0.1,"[2 2 3 ... 7 8 9]"\n', None, 2),
+        ("t_ms,a\n" + "0,1\n10,x\n" * 9, None, None),
         ("time,a\n01/02/2024 10:00:00,1\n01/02/2024 10:00:01,2\n", None, None),
     ],
 )
@@ -431,6 +487,75 @@ def test_utf_16_without_its_mark_and_damaged_gzip_are_refused(tmp_path: Path, co
         opened(tmp_path, gzip.compress(b"t_s,a\n" + b"0,1\n" * 9999)[:40], name="b.csv.gz")
 
 
+#: How two sensors write a line each in turn, and the sources that they are.
+IN_TURN = {
+    "keys": ("{t},L:{a},2\n{u},R:900,{b}\n", ("L", "R")),
+    "JSON": ('{{"t":{t},"left":[{a},2]}}\n{{"t":{u},"right":[900,{b}]}}\n', ("left", "right")),
+    "one more value": ("t:{t} thumb:{a} 2\nt:{u} palm:900 {b} 7\n", ("thumb", "palm")),
+    "prefixes": ("left: {t},{a},2\nright: {u},900,{b}\n", ("left", "right")),
+}
+
+
+@given(
+    kind=st.sampled_from([*IN_TURN]),
+    rows=st.lists(st.tuples(st.integers(0, 9), st.integers(0, 900)), min_size=12, max_size=40),
+    odd=st.booleans(),
+)
+def test_sensors_that_lines_name_are_sources(
+    kind: str, rows: list[tuple[int, int]], odd: bool, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    line, names = IN_TURN[kind]
+    lines = [line.format(t=20 * k, u=20 * k + 5, a=a, b=b) for k, (a, b) in enumerate(rows)]
+    text = "".join([*lines[:5], *["Sensor ready\n"] * odd, *lines[5:]])
+    layout = '[table]\ntime_column = 1\ntime_unit = "ms"\n'
+    found = opened(tmp_path_factory.mktemp("turns"), text, layout)
+    assert set(found.sources) == {*names}
+    for at, (name, begin) in enumerate(zip(names, (0, 5000), strict=True)):
+        t, values = frames(found, name)
+        assert t == [begin + 20_000 * k for k in range(len(rows))]
+        assert [row[at] for row in values] == [row[at] for row in rows]
+
+
+def test_lines_that_name_one_sensor_or_a_state_now_and_then_are_of_one(tmp_path: Path) -> None:
+    text = "".join(f"t:{10 * k} a:{k % 7} b:{k % 5}\n" + "battery: 87\n" * (k % 20 == 9) for k in range(60))
+    assert list(opened(tmp_path, text, '[table]\ntime_unit = "ms"\n').sources) == [""]
+
+
+def test_sheets_with_the_same_columns_are_sources(tmp_path: Path) -> None:
+    pytest.importorskip("openpyxl")
+    path = tmp_path / "a.xlsx"
+    with pd.ExcelWriter(path) as book:
+        for name, more in (("walk", 0), ("run", 9)):
+            sheet = pd.DataFrame({"t_s": np.arange(30) / 50, "a": np.arange(30) % 7 + more})
+            sheet.to_excel(book, sheet_name=name, index=False)
+        pd.DataFrame({"subject": ["A"], "age": [31]}).to_excel(book, sheet_name="about", index=False)
+    found = opened_by(read_table, path, None)
+    assert list(found.sources) == ["walk", "run"]
+    assert frames(found, "run")[1] == [[k % 7 + 9] for k in range(30)]
+    assert "other sheets: about" in found.lost
+    found = opened_by(read_table, path, '[table]\nsheet = "run"\n')
+    assert frames(found)[1][0] == [9]
+    with refused(FormatError, place=Place("a.xlsx")):
+        opened_by(read_table, path, '[table]\nsheet = "jump"\n')
+
+
+def test_parquet_is_read_as_it_is_typed(tmp_path: Path) -> None:
+    """Lists in cells too, also of lists, in full."""
+    random = np.random.default_rng(1)
+    grid, row = random.random((9, 20, 30)).astype(np.float32), random.integers(0, 9, (9, 1200))
+    table = pd.DataFrame({"timestamp": np.arange(9) / 30, "frame_index": range(9), "slip": [False, True] * 4 + [True]})
+    table["palm"], table["thumb"] = [frame.tolist() for frame in grid], list(row)
+    pytest.importorskip("pyarrow")
+    table.to_parquet(tmp_path / "a.parquet")
+    found = opened_by(read_table, tmp_path / "a.parquet", None)
+    t, values = frames(found)
+    assert t == [round(k * 1e6 / 30) for k in range(9)]
+    np.testing.assert_array_equal(values, np.column_stack([grid.reshape(9, -1), row]))
+    assert "frame_index left out: a counter" in found.said
+    again = opened_by(read_table, tmp_path / "a.parquet", of_layout(found.layout))
+    assert again.sources == found.sources
+
+
 @pytest.mark.parametrize("ending", [".xlsx", ".parquet"])
 @pytest.mark.parametrize("dates", [False, True])
 def test_spreadsheets_and_parquet_open(tmp_path: Path, ending: str, dates: bool) -> None:
@@ -459,3 +584,4 @@ def test_a_table_of_events_opens_as_events(tmp_path: Path) -> None:
     found = opened(tmp_path, "x,y,p,t_us\n1,2,1,10\n3,4,0,10\n5,6,1,30\n")
     expected = Events([10, 10, 30], [1, 3, 5], [2, 4, 6], [True, False, True], array=Array.thesis())
     assert found.sources == {"": expected}
+    assert "64 x 64 taxels assumed" in found.said

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 from taxel._base.header_table import HeaderTable
 from taxel.formats.form import Form
-from taxel.formats.layout import Table
+from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
-from taxel.formats.lines import KINDS, read_line
+from taxel.formats.lines import KINDS, Line, read_line
 from taxel.formats.table_columns import Draft
 from taxel.formats.times import repaired
 
@@ -256,7 +256,9 @@ def test_thousands_are_read_where_marks_show_them_and_asked_about_where_they_may
 
 
 def called_each(names: tuple[str, ...]) -> object:
-    draft = Draft(cast("Fit", None), Table(), names, names)
+    line = Line(("1",) * len(names), names)
+    fit = Fit("plain", ",", ".", None, [(0, line)], [0], ["number"] * len(names), 1.0, 1.0)
+    draft = Draft(fit, Table(), names, names, Layout(Path("a.csv")))
     return [draft.called(k) for k in range(len(names))]
 
 

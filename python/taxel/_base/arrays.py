@@ -310,7 +310,11 @@ def _of_matlab(path: Path) -> dict[str, _Stored]:
             return values
 
     with _reading(path, "MATLAB file"):
-        found = [(name, shape) for name, shape, kind in whosmat(path) if kind in _MATLAB]
+        try:
+            found = [(name, shape) for name, shape, kind in whosmat(path) if kind in _MATLAB]
+        except TypeError:
+            right = "save its columns, for a table by writetable(T, 'FILE.csv')"
+            raise unreadable(f"contains an object of MATLAB, which SciPy does not read; {right}", path) from None
     # The width of numbers that are stored in fewer bytes than their class has is known when they are read.
     return {name: _Stored(shape, np.dtype(np.float64), partial(read, name)) for name, shape in found}
 

@@ -6,7 +6,7 @@ import gzip
 import io
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from itertools import islice
@@ -29,6 +29,8 @@ SHEETS = (".xlsx", ".xlsm", ".ods", ".parquet")
 #: Characters of the beginning that are looked at, and more if these are few lines.
 _HEAD, _MORE = 1 << 16, 1 << 22
 _FEW_LINES = 24
+#: So many first lines are looked at, and as many over the rest of a file.
+_SPREAD = 1000
 
 
 def beginning(path: Path, count: int = _HEAD) -> bytes:
@@ -53,11 +55,24 @@ class Text:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self._name = path, ""
+        self._takes: Callable[[str], bool] | None = None
         self.is_file = path.suffix.lower() not in (*SHEETS, *ARRAYS) and not self._rows
         self._encoding = ""
-        #: Whether the last of the lines that were read has an end.
-        self.ends_in_line = True
+        #: Whether the last of the lines that were read has an end, and whether more follow those of the head.
+        self.ends_in_line, self.goes_on = True, False
+
+    def of_sheet(self, name: str) -> Text:
+        """Return the text of one sheet of a workbook."""
+        part = Text(self.path)
+        part.sheets, part._name = self.sheets, name
+        return part
+
+    def of_lines(self, takes: Callable[[str], bool]) -> Text:
+        """Return the text in which all lines are empty but those that it takes."""
+        part = Text(self.path)
+        part._takes = takes
+        return part
 
     @property
     def encoding(self) -> str:
@@ -81,13 +96,19 @@ class Text:
         self._encoding = "latin-1"
 
     def lines(self) -> Iterator[str]:
-        """Yield all lines without their ends."""
+        """Yield all lines without their ends; of a typed table its cells between tabs, below their names."""
+        if self.typed is not None:
+            for begin in range(0, max(1, len(self.typed)), _SPREAD):
+                part = self.typed[begin : begin + _SPREAD].to_csv(sep="\t", index=False, header=not begin)
+                yield from part.splitlines()
+            return
         count = 0
         with self.opened() as text:
             try:
                 for line in text:
                     self.ends_in_line = line.endswith("\n")
-                    yield line.rstrip("\n")
+                    bare = line.rstrip("\n")
+                    yield bare if self._takes is None or self._takes(bare) else ""
                     count += 1
                 return
             except UnicodeDecodeError as error:
@@ -99,11 +120,27 @@ class Text:
         """The first lines; the last of them is whole, if the text goes on."""
         lines, count = list[str](), 0
         for line in self.lines():
-            if count > _MORE or (count > _HEAD and len(lines) >= _FEW_LINES):
+            if count > _MORE or len(lines) >= _SPREAD or (count > _HEAD and len(lines) >= _FEW_LINES):
+                self.goes_on = True
                 break
             lines.append(line)
             count += len(line) + 1
         return lines
+
+    @cached_property
+    def spread(self) -> list[str]:
+        """Lines that are spread over the rest of a file of bytes, about a thousand; none of a compressed one."""
+        begin = sum(len(line) + 1 for line in self.head)
+        if not self.is_file or self.path.suffix.lower() == ".gz" or self.encoding.startswith("utf-16"):
+            return []
+        rest, longest = self.path.stat().st_size - begin, 2 * max(map(len, self.head), default=0) + 2
+        found = list[bytes]()
+        with open(self.path, "rb") as file:
+            for place in range(0, max(0, rest), max(1, rest // min(_SPREAD, 1 + _MORE // longest))):
+                file.seek(begin + place)
+                found += file.read(longest).split(b"\n")[1:2]
+        lines = (line.decode(self.encoding, "replace").rstrip("\r") for line in found)
+        return [line for line in lines if self._takes is None or self._takes(line)]
 
     @contextmanager
     def opened(self) -> Iterator[IO[str]]:
@@ -140,6 +177,32 @@ class Text:
         return document if are_rows and len(document) > 1 else []
 
     @cached_property
+    def typed(self) -> Any:
+        """The DataFrame of a table of Parquet, a column for each place in its lists; None of any other file."""
+        if self.path.suffix.lower() != ".parquet":
+            return None
+        import pandas as pd  # noqa: PLC0415  takes long
+
+        try:
+            table = pd.read_parquet(self.path)
+        except Exception as error:  # of pyarrow
+            raise self._damaged(error) from None
+        named = table if type(table.index) is pd.RangeIndex else table.reset_index()
+        columns = (each for name in named.columns for each in _columns_in(str(name), named[name]))
+        return pd.DataFrame(dict(columns))
+
+    def _damaged(self, error: Exception) -> Exception:
+        """Return the error of a table that pandas does not read."""
+        if isinstance(error, ImportError):
+            text = f"to read it, taxel needs pandas with openpyxl and pyarrow: {installing('tables')}"
+            return ImportError(f"{self.path}: {text}")
+        if self.path.suffix.lower() != ".parquet" and beginning(self.path, 4) == b"\xd0\xcf\x11\xe0":
+            return unreadable(
+                "is encrypted, or of an older kind; save it without a password, as .xlsx or .csv", self.path
+            )
+        return damaged(self.path, f"{self.path.suffix} file", first_line(error))
+
+    @cached_property
     def _sheet(self) -> str:
         """A table as lines of cells between tabs: a sheet with numbers, one of Parquet, or an array of records."""
         if self._rows:
@@ -155,19 +218,42 @@ class Text:
             records = read_arrays(self.path, [name])[name].ravel()
             columns = {name: _cells(column) for name, column in columns_of(records)}
             return str(pd.DataFrame(columns).to_csv(sep="\t", index=False))
+        return str(
+            self.sheets[self._name or next(iter(self.sheets))].map(_cell).to_csv(sep="\t", index=False, header=False)
+        )
+
+    @cached_property
+    def sheets(self) -> dict[str, Any]:
+        """The DataFrames of a workbook's sheets by their names; none of any other file."""
+        if self.path.suffix.lower() not in SHEETS or self.typed is not None:
+            return {}
+        import pandas as pd  # noqa: PLC0415  takes long
+
         try:
-            if self.path.suffix.lower() == ".parquet":
-                table = pd.read_parquet(self.path)
-                named = table if type(table.index) is pd.RangeIndex else table.reset_index()
-                return str(named.to_csv(sep="\t", index=False))
-            sheets = pd.read_excel(self.path, sheet_name=None, header=None, dtype=object)
-        except ImportError:
-            text = f"to read it, taxel needs pandas with openpyxl and pyarrow: {installing('tables')}"
-            raise ImportError(f"{self.path}: {text}") from None
-        except Exception as error:  # of zipfile, of XML, of pyarrow
-            raise damaged(self.path, f"{self.path.suffix} file", first_line(error)) from None
-        largest = max(sheets.values(), key=lambda sheet: sheet.notna().to_numpy().sum(), default=pd.DataFrame())
-        return str(largest.map(_cell).to_csv(sep="\t", index=False, header=False))
+            return dict(pd.read_excel(self.path, sheet_name=None, header=None, dtype=object))
+        except Exception as error:  # of zipfile, of XML
+            raise self._damaged(error) from None
+
+
+def _columns_in(name: str, column: Any) -> Iterator[tuple[str, Any]]:
+    """Yield a column of a DataFrame, or a column for each place in its lists, if all have the same shape."""
+    first = column.iloc[0] if len(column) else None
+    if column.dtype != object or not isinstance(first, np.ndarray | list):
+        yield name, column
+        return
+    try:
+        values = np.stack([_values_in(cell) for cell in column])
+    except ValueError:
+        yield name, column.map(str)
+        return
+    for place in np.ndindex(values.shape[1:]):
+        yield name + "".join(f"[{k}]" for k in place), values[:, *place]
+
+
+def _values_in(cell: Any) -> NDArray[Any]:
+    """Return the values of a list in a cell, or of lists in it, as arrays of pyarrow hold them."""
+    values = np.asarray(cell)
+    return np.stack([_values_in(each) for each in cell]) if values.dtype == object and len(values) else values
 
 
 def _rows_in(document: Any) -> Any:

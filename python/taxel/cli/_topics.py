@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -29,6 +30,7 @@ def list_topics(file: Path, found: Sequence[Topic], as_json: bool) -> list[str]:
         "  " + "  ".join([*(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)), kind])
         for row, kind in zip(rows, kinds, strict=True)
     ]
-    named = next((topic for topic in found if not topic.trouble), found[0])
+    # An id is no skin: most numbers are.
+    named = max(found, key=lambda topic: (not topic.trouble, math.prod(topic.shape)))
     more = f" --field {named.field}" * bool(named.field) + " --array ROWSxCOLUMNS" * (len(named.shape) < 2)
     return [f"{file}: ROS bag; open a topic by --topic {named.topic}{more}", *lines]

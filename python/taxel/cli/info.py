@@ -243,6 +243,7 @@ def _lines(pressed: Series) -> Iterator[str]:
 def _page(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording as lines for people."""
     from taxel.formats.layout import layout_name  # noqa: PLC0415
+    from taxel.formats.roles import SURE, Role, lines_of  # noqa: PLC0415
     from taxel.recording import kind_of_file  # noqa: PLC0415
 
     head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
@@ -252,6 +253,8 @@ def _page(facts: dict[str, Any]) -> list[str]:
     # Remarks on data left out of a bag, or on other times, concern all rows that follow.
     rows = [*missing, *rows] if facts["kind"] == "ros" else [*rows, *missing]
     lines = [head, *(f"  {name:<19} {value}" for name, value in rows)]
+    if any(role["certainty"] != SURE for role in facts["roles"]):
+        lines += ["roles of its columns; ~ is assumed:", *lines_of([Role(**role) for role in facts["roles"]])]
     if facts["layout"]:
         lines += [
             f"read by this layout, which {layout_name(Path(facts['file']))} may state:",

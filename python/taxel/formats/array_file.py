@@ -17,8 +17,9 @@ from taxel._base.messages import counted
 from taxel.events import Events
 from taxel.formats.column_names import AXES, time_unit
 from taxel.formats.layout import Data, Layout, advice
-from taxel.formats.layout_text import refuse_to_choose
+from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
+from taxel.formats.roles import LIKELY, OPEN, SURE, Changes, Question, Role
 from taxel.formats.times import in_order, unit_of_times
 from taxel.frames import Frames
 from taxel.reading import InMemory
@@ -31,7 +32,7 @@ def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
     ------
     FormatError : no such array, several that may hold the frames, or axes that can be read in two ways (prints both)
     """
-    how, said, stored = look(path, layout)
+    how, said, roles, stored = look(path, layout)
     shape = stored[how.array or ""]
     named = (how.axes or "").split()
     if len(named) != len(shape):
@@ -63,7 +64,7 @@ def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
         sources.update(sources_of(path, full, f"trial{k}" if len(values) > 1 else "", trial, t))
     unread = ", ".join(name for name in stored if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
-    return readers_of(path, "arrays", sources, full, said, timed=how.time is not None, lost=lost)
+    return readers_of(path, "arrays", sources, full, said, timed=how.time is not None, lost=lost, roles=roles)
 
 
 def _of_column(path: Path, number: int, named: Sequence[str], how: Data) -> NDArray[Any]:
@@ -75,8 +76,10 @@ def _of_column(path: Path, number: int, named: Sequence[str], how: Data) -> NDAr
     return times
 
 
-def look(path: Path, layout: Layout) -> tuple[Data, list[str], dict[str, tuple[int, ...]]]:
-    """Return how the arrays of a file are read, what was guessed of it, and their shapes; the frames are not read.
+def look(path: Path, layout: Layout) -> tuple[Data, list[str], list[Role], dict[str, tuple[int, ...]]]:
+    """Return how the arrays of a file are read, what was guessed of it, what each is, and their shapes.
+
+    The frames are not read.
 
     Raises
     ------
@@ -89,14 +92,11 @@ def look(path: Path, layout: Layout) -> tuple[Data, list[str], dict[str, tuple[i
             f"contains no numbers; must hold an array of numbers{struct * (path.suffix.lower() == '.mat')}", path
         )
     how = _named(path, layout.data or Data(), stored)
-    if how.axes is not None:
-        return how, [], stored
-    how, said = _axes(path, layout, how, stored, is_said=layout.data is not None or _is_given(path, layout))
-    return how, said, stored
-
-
-def _is_given(path: Path, layout: Layout) -> bool:
-    return layout.path != path
+    full, said, roles, questions = _axes(path, layout, how, stored)
+    questions = [question for question in questions if not question.keys & layout.stated]
+    refuse_open(path, f"contains {_list(stored)}, which can be read in", full, roles, questions)
+    assert full.data is not None  # it is that of the axes
+    return full.data, said, roles, stored
 
 
 def _size(shape: Sequence[int]) -> str:
@@ -134,67 +134,99 @@ def _named(path: Path, how: Data, stored: Mapping[str, tuple[int, ...]]) -> Data
 
 
 def _axes(
-    path: Path, layout: Layout, how: Data, stored: Mapping[str, tuple[int, ...]], *, is_said: bool
-) -> tuple[Data, list[str]]:
-    """Return what each axis counts, and what was guessed of it.
+    path: Path, layout: Layout, how: Data, stored: Mapping[str, tuple[int, ...]]
+) -> tuple[Layout, list[str], list[Role], list[Question]]:
+    """Return the layout with what each axis counts, what was guessed of it, what each array is, and what is open.
 
     Raises
     ------
-    FormatError : axes that can be read in two ways, or frames without times that no layout describes (prints layouts)
+    FormatError : an array that holds no frames
     """
-    shape = stored[how.array or ""]
-    if len(shape) not in (1, 2, 3, 4) or 0 in shape:
-        called = how.array or "the array"
+    shape, called = stored[how.array or ""], how.array or "the array"
+    if 0 in shape:
+        raise unreadable(f"{called} is empty ({_size(shape)})", path)
+    if len(shape) not in (1, 2, 3, 4):
         raise unreadable(f"{called} is {_size(shape)}; must be frames x rows x columns, or x taxels", path)
+    stated = (how.axes or "").split()
     inner = {1: [], 2: ["taxel"], 3: ["row", "column"], 4: ["row", "column", "axis"]}[len(shape)]
-    if len(shape) == 3 and shape[-1] == len(AXES) and shape[1] > len(AXES) and layout.axis is not None:
-        inner = ["taxel", "axis"]
+    by_shape = len(shape) > 2 and shape[-1] == len(AXES) and (len(shape) == 4 or shape[1] > len(AXES))
+    inner = ["taxel", "axis"] if by_shape and len(shape) == 3 else inner
 
-    def with_time_at(axis: int) -> Data:
-        return replace(how, axes=" ".join([*inner[:axis], "time", *inner[axis:]]))
+    def with_time_at(axis: int) -> str:
+        return " ".join([*inner[:axis], "time", *inner[axis:]])
 
     # Times are an array of their name, of as many as one axis counts.
     counts = {name: math.prod(size) for name, size in stored.items() if time_unit(name) is not None}
-    named = next((name for name, count in counts.items() if shape.count(count) == 1), None)
-    # A layout that states the unit alone does not say that there are no times.
-    if is_said and (named is None or layout.data is not None or layout.rate_hz):
-        return with_time_at(0), []
-    longest = int(np.argmax(shape))
-    if named is None:
-        full, said = with_time_at(longest), [f"axis {longest} ({shape[longest]}) is the time"]
-        guesses = {f"axis {k} ({shape[k]}) is the time": with_time_at(k) for k in dict.fromkeys((longest, 0))}
-        choices = {} if layout.rate_hz else {why: replace(layout, data=each) for why, each in guesses.items()}
-        if choices and len(shape) == 2 and longest == 0 and shape[1] > 1:
-            choices = {**_with_time_in_it(path, layout, full), **choices}
+    fits = [name for name, count in counts.items() if shape.count(count) == 1]
+    if stated:
+        fits = [name for name, count in counts.items() if shape[stated.index("time")] == count]
+    time = how.time if how.time is not None else next(iter(fits), None)
+    said, questions = list[str](), list[Question]()
+    if stated:
+        axis = stated.index("time")
     else:
-        axis = shape.index(counts[named])
-        times = read_arrays(path, [named])[named].ravel().astype(np.float64)
-        unit, possible = time_unit(named) or "", dict[str, float]()
-        if not unit:
-            unit, possible = unit_of_times(times)
-        how = replace(how, time=named, time_unit=unit)
-        full, said = with_time_at(axis), [f"axis {axis} ({shape[axis]}) is the time", f"time {named!r} in {unit}"]
-        choices = {f"times in {each}": replace(layout, data=replace(full, time_unit=each)) for each in possible}
-        has_axes = len(shape) > 2 and shape[-1] == len(AXES) and axis != len(shape) - 1 and layout.axis is None
-        if has_axes and (len(shape) == 4 or shape[1] > len(AXES)):
-            axes = (full.axes or "").removesuffix(" axis").removesuffix(" column") + " axis"
-            of_axes = replace(full, axes=axes if len(shape) == 3 else full.axes)
-            of_axes = replace(of_axes, axes=(of_axes.axes or "").replace("row axis", "taxel axis"))
-            choices = {f'axis = "{each}"': replace(layout, data=of_axes, axis=each) for each in ("z", "all", "shear")}
+        axis = shape.index(counts[time]) if time in fits else int(np.argmax(shape))
+        said.append(f"axis {axis} ({shape[axis]}) is the time")
+    if isinstance(time, str) and how.time is None:
+        how = _timed(path, layout, how, time, questions)
+        said.append(f"time {time!r} in {how.time_unit}")
+    likely: dict[str, Changes] = {f"axis {axis} ({shape[axis]}) is the time": {"axes": with_time_at(axis)}}
+    if time is None:
+        likely |= {f"axis 0 ({shape[0]}) is the time": {"axes": with_time_at(0)}} if axis else {}
+        likely = {**_with_time_in_it(path, how, shape), **likely} if axis == 0 and len(shape) == 2 else likely
+    others = [name for name, size in stored.items() if size == shape[:1] and name not in (how.array, time)]
+    if len(shape) > 2 and axis == 1 and others:
+        trials = "trial time taxel" if len(shape) == 3 else "trial time row column"
+        likely = {f"axis 0 ({shape[0]}) counts trials, as {others[0]} does": {"axes": trials}, **likely}
+    if not stated and (len(likely) > 1 or (time is None and not layout.rate_hz)):
+        questions.insert(0, Question("which axis is the time", frozenset({"axes"}), likely))
+    named = stated or with_time_at(axis).split()
+    if "axis" in named and shape[named.index("axis")] == len(AXES) and layout.axis is None:
+        choices: dict[str, Changes] = {f'axis = "{each}"': {"axis": each} for each in ("z", "all", "shear")}
+        if len(shape) == 3 and not stated:
+            choices["three columns of taxels"] = {
+                "axes": " ".join(named).replace("taxel", "row").replace("axis", "column")
+            }
+        questions.append(Question("taxels with the axes x, y and z", frozenset({"axis"}), choices))
+    how = replace(how, axes=" ".join(named))
+    certainty = OPEN if questions else SURE if stated else LIKELY
+    roles = [
+        Role(f"{called} axis {k}", [str(size)], name, "", certainty, axis=str(k))
+        for k, (name, size) in enumerate(zip(named, shape, strict=False))
+    ]
+    roles += [
+        Role(name, [], "time" if name == time else "no taxel", "named so" * (name == time))
+        for name in stored
+        if name != (how.array or "")
+    ]
+    return replace(layout, data=how), said, roles, questions
+
+
+def _timed(path: Path, layout: Layout, how: Data, time: str, questions: list[Question]) -> Data:
+    """Return the same with an array of times and their unit; ask for it if it is open."""
+    times = read_arrays(path, [time])[time].ravel().astype(np.float64)
+    unit, possible = time_unit(time) or "", dict[str, float]()
+    if not unit and "time_unit" not in layout.stated:
+        unit, possible = unit_of_times(times)
+    choices: dict[str, Changes] = {f"times in {each}": {"time_unit": each} for each in possible}
     if choices:
-        refuse_to_choose(path, f"contains {_list(stored)}", choices)
-    return full, said
+        questions.append(Question("the unit of the time", frozenset({"time_unit"}), choices))
+    return replace(how, time=time, time_unit=how.time_unit if "time_unit" in layout.stated else unit)
 
 
-def _with_time_in_it(path: Path, layout: Layout, how: Data) -> dict[str, Layout]:
+def _with_time_in_it(path: Path, how: Data, shape: Sequence[int]) -> dict[str, Changes]:
     """Return the layout of an array whose first taxel ascends in like steps, as the time does; none of others."""
+    if shape[1] < 2:
+        return {}
     column = read_arrays(path, [how.array or ""])[how.array or ""][:, 0]
     steps = np.diff(column.astype(np.float64)) if column.dtype.kind in "uif" else np.empty(0)
     if len(steps) < len(AXES) or not (steps > 0).all() or steps.max() > 2 * steps.min():
         return {}
     unit, several = unit_of_times(column.astype(np.float64))
-    of_time = {each: replace(layout, data=replace(how, time=1, time_unit=each)) for each in [*several] or [unit]}
-    return {f"taxel 1 is the time, in {each}": full for each, full in of_time.items()}
+    return {
+        f"taxel 1 is the time, in {each}": {"axes": "time taxel", "time": 1, "time_unit": each}
+        for each in [*several] or [unit]
+    }
 
 
 def _in_order(path: Path, values: NDArray[Any], named: Sequence[str], how: Data) -> NDArray[np.float32]:

@@ -15,6 +15,7 @@ _UNITS_OF_TIME = {
     "ns": ("ns", "nsec", "nanos", "nanosec", "nanosecs", "nanoseconds", "nsecs"),
     "min": ("min", "minute", "minutes", "minuten"),
     "h": ("h", "hour", "hours", "stunden"),
+    "d": ("day", "days", "tage", "datenum"),
 }
 _UNIT_OF_TIME = "|".join(word for words in _UNITS_OF_TIME.values() for word in words)
 #: Those that are nothing else: a name may end in [min] for the least value.
@@ -24,6 +25,7 @@ _TIME = (
     r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
     r"|elapsed(?:[ _]time)?|(?:mess|uhr|system)?zeit(?:stempel|punkt)?|temps|tiempo|tempo|tijd|tid"
     r"|datetime|date[ _]time|epoch|clock|ticks?|millis|micros|ms|msec|us|usec|n(?:ano)?secs?|secs?|seconds|sekunden"
+    r"|datenum"
 )
 #: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
 _TIMES = re.compile(

@@ -20,6 +20,7 @@ CONTAINERS = {
     ".rdata": "in R, save the table with write.csv",
     ".sav": "save the table as .csv",
     ".feather": "save the table as .parquet or .csv",
+    ".zarr": "in Python, save the array with numpy.save",
     ".zip": "unpack it first",
     ".7z": "unpack it first",
     ".zst": "unpack it first",

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import NamedTuple
 
@@ -16,7 +15,8 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.formats.layout import Table
-from taxel.formats.lines import MISSING, OTHER, WITH_THOUSANDS, is_number, number_of, read_line
+from taxel.formats.lines import MISSING, OTHER, WITH_TEXT, WITH_THOUSANDS, is_number, number_of, read_line
+from taxel.formats.roles import Role
 from taxel.formats.times import ISO, UNITS_US, is_time, seconds_of
 
 
@@ -54,6 +54,8 @@ class Form:
         Number of lines of a frame of a live source, 0 if only an empty line shows it.
     keys : mapping
         What was understood beyond what is stated of a live source, as its keys.
+    roles : sequence of Role
+        Of each column.
     """
 
     table: Table
@@ -63,6 +65,7 @@ class Form:
     own: tuple[str, ...] = ()
     lines: int = 1
     keys: Mapping[str, str] = field(default_factory=dict)
+    roles: Sequence[Role] = ()
 
     def called(self, column: int) -> str:
         """Return the name of a column, or its number if it has none."""
@@ -78,22 +81,19 @@ class Form:
         """
         how, names = self.table, self.names
         times, taxel = (
-            () if getattr(how, key) is None else places_of(names, key, getattr(how, key))
+            places_of(names, key, getattr(how, key)) if getattr(how, key) else ()
             for key in ("time_column", "taxel_column")
         )
         label, by = (
-            None if getattr(how, key) is None else place_of(names, key, getattr(how, key))
-            for key in ("label_column", "by")
+            place_of(names, key, getattr(how, key)) if getattr(how, key) else None for key in ("label_column", "by")
         )
-        counts = Counter(names)
-        at = {name: k for k, name in enumerate(names) if counts[name] == 1}
-        left = {at[column] if column in at else place_of(names, "leave_out", column) for column in how.leave_out}
+        left = left_out(names, how)
         twice = next((k for k in times if k in left), None)
         if twice is not None:
             raise ProblemError(f"column {shown(names[twice])} is the time_column, but is also in leave_out")
         others = {*left, *times, *taxel, label, by}
         taxels = (k for k in range(len(names)) if k not in others)
-        kept = tuple(k for k in taxels if how.keep is None or fnmatchcase(names[k], how.keep))
+        kept = tuple(k for k in taxels if how.keeps(names[k]))
         return Columns(times, taxel, label, by, kept)
 
     @property
@@ -106,24 +106,24 @@ class Form:
         """The columns whose sum is the time, each with its unit, us; texts of times are read as seconds."""
         times = self.columns.times
         if len(times) > 1:
-            return tuple(zip(times, (UNITS_US["s"], UNITS_US["ns"]), strict=True))
+            return tuple(zip(times, (UNITS_US["s"], UNITS_US["ms" if self._texts else "ns"]), strict=True))
         return tuple((k, UNITS_US["s" if self.table.time_unit == ISO else self.table.time_unit]) for k in times)
 
     @property
     def unit_of_times(self) -> str:
         """The unit of times as they are read."""
-        of_sum = "ns" if len(self.columns.times) > 1 else self.table.time_unit
+        of_sum = "ns" if len(self.columns.times) > 1 and not self._texts else self.table.time_unit
         return self.table.frame_time or of_sum
 
     @cached_property
     def missing(self) -> frozenset[str]:
         """Cells without a value."""
-        return frozenset((*MISSING, *([] if self.table.missing is None else [self.table.missing])))
+        return frozenset((*MISSING, *self.table.missing_texts))
 
     @cached_property
     def _texts(self) -> frozenset[int]:
-        """The columns whose texts are times."""
-        return frozenset(self.columns.times if self.table.time_unit == ISO else ())
+        """The column whose texts are times; milliseconds may be in the next one."""
+        return frozenset(self.columns.times[:1] if self.table.time_unit == ISO else ())
 
     @cached_property
     def _numbers(self) -> frozenset[int]:
@@ -149,6 +149,8 @@ class Form:
     def values(self, line: str) -> tuple[list[float], str]:
         """Return the numbers of a line, times of texts in s, NaN for other cells, and what is odd about it.
 
+        Of a line in which a reading is no number, but most are, it returns the others too.
+
         Examples
         --------
         >>> table = Table(separator=";", decimal=",", time_column=1, time_unit="iso")
@@ -164,17 +166,20 @@ class Form:
                     if max(found) <= VALUE and min(found) >= -VALUE and not math.isnan(sum(found)):
                         return found, ""
         cells, odd = self.cells(line)
-        if odd:
+        if odd and (odd != WITH_TEXT or self.table.events):
             return [], odd
         found = list(map(self._value, range(count), cells))
-        return (found, "") if all(not abs(value) > VALUE for value in found) else ([], "with a number out of range")
+        if odd and 2 * sum(map(math.isnan, found)) > count:
+            return [], odd
+        return (found, odd) if all(not abs(value) > VALUE for value in found) else ([], "with a number out of range")
 
     def _value(self, column: int, cell: str) -> float:
         if column in self._texts:
             return seconds_of(cell.strip("\"'"))
-        if column not in self._numbers or cell in self.missing:
+        marks = self.table.decimal, self.table.thousands
+        if column not in self._numbers or not is_number(cell, *marks):
             return math.nan
-        return number_of(cell, self.table.decimal, self.table.thousands)
+        return number_of(cell, *marks)
 
     def _odd(self, cells: Sequence[str]) -> str:
         """Return what is odd about the cells of a line; "" if nothing is."""
@@ -187,8 +192,21 @@ class Form:
             # A reading may be missing, a time may not.
             if not is_number(cells[k], *marks) and (cells[k] not in self.missing or k in self.columns.times):
                 has_thousands = thousands is None and is_number(cells[k], decimal, OTHER[decimal])
-                return WITH_THOUSANDS if has_thousands else "with a cell that is no number"
+                of_time = "with a time that is no number" if k in self.columns.times else WITH_TEXT
+                return WITH_THOUSANDS if has_thousands else of_time
         return "" if all(is_time(cells[k]) for k in self._texts) else "without a time"
+
+
+def left_out(names: Sequence[str], how: Table) -> set[int]:
+    """Return the places of the columns that a table leaves out.
+
+    Raises
+    ------
+    ProblemError : there is no such column
+    """
+    counts = Counter(names)
+    at = {name: k for k, name in enumerate(names) if counts[name] == 1}
+    return {at[column] if column in at else place_of(names, "leave_out", column) for column in how.leave_out}
 
 
 def place_of(names: Sequence[str], key: str, column: str | int) -> int:

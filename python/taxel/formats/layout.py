@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -42,13 +43,13 @@ class Table:
         The names of the columns, for a table without names.
     time_column : str or int, optional
         The column of times, by its name or its number from 1; "A+B" is the sum of seconds and of nanoseconds within
-        them; default: none.
+        them, or of a time of day and the milliseconds behind a comma; 0: none.
     time_unit : {"s", "ms", "us", "ns", "min", "h", "iso"}
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
         days with points (01.05.2024 10:15:02,010), with slashes and the year first (2024/5/1 10:15:02) and with the
         month by its name (01-May-2024 10:15:02) too, and, with AM or PM, with slashes, the month first.
-    missing : str, optional
-        A further cell without a value, beside those of `taxel.formats.lines.MISSING`.
+    missing : str or list of str, optional
+        Further cells without a value, beside those of `taxel.formats.lines.MISSING`.
     thousands : str, optional
         Character between the thousands of a number: 1.234,5 has "."; default: none.
     leave_out : list of str or int
@@ -58,10 +59,12 @@ class Table:
     label_column : str or int, optional
         A column whose value becomes a label where it changes; it is no taxel.
     by : str or int, optional
-        A column that says which sensor a line is of: each of its values is a source; it is no taxel.
+        A column that says which sensor a line is of: each of its values is a source; it is no taxel. 0: none.
     taxel_column : str or int, optional
         A column that says which taxel a line is of, whose reading is in the only other column: the lines of one time
         are a frame. "A+B": two columns, the row and the column of the taxel.
+    sheet : str, optional
+        The sheet of a workbook that is read; default: those with the columns of the largest, each a source.
     lines : {"plain", "marked", "json", "hex"}
         "marked": brackets, quotes, arrows and ``NAME:`` are between cells too, and a unit may be behind a number;
         "json": a line is an object or a list of JSON, whose columns have the names of its keys; "hex": cells are
@@ -88,13 +91,14 @@ class Table:
     columns: Sequence[str] = ()
     time_column: str | int | None = None
     time_unit: str = "s"
-    missing: str | None = None
+    missing: str | Sequence[str] | None = None
     thousands: str | None = None
     leave_out: Sequence[str | int] = ()
     keep: str | None = None
     label_column: str | int | None = None
     by: str | int | None = None
     taxel_column: str | int | None = None
+    sheet: str | None = None
     lines: str = "plain"
     frame_lines: int | None = None
     frame_end: str | None = None
@@ -112,9 +116,11 @@ class Table:
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         integer("skip_lines", self.skip_lines, 0)
         _check_columns(self, "time_column", "label_column", "by", "taxel_column", "leave_out")
-        for name in ("keep", "missing", "frame_begin"):
+        for name in ("keep", "sheet", "frame_begin"):
             if getattr(self, name) is not None:
                 text(name, getattr(self, name))
+        for cell in self.missing_texts:
+            text("missing", cell)
         for column in several("columns", self.columns):
             text("columns", column)
         if self.frame_time is not None and text("frame_time", self.frame_time, UNITS_US) and self.frame_begin is None:
@@ -129,6 +135,15 @@ class Table:
     def has_lines(self) -> bool:
         """Whether a frame may have several lines."""
         return not (self.frame_lines is None and self.frame_end is None and self.frame_begin is None)
+
+    @property
+    def missing_texts(self) -> Sequence[str]:
+        """The further cells without a value."""
+        return [self.missing] if isinstance(self.missing, str) else () if self.missing is None else self.missing
+
+    def keeps(self, name: str) -> bool:
+        """Whether a column of this name may be a taxel."""
+        return self.keep is None or fnmatchcase(name, self.keep)
 
     def is_between(self, line: str) -> bool:
         """Whether a line holds no numbers, but separates frames."""
@@ -148,13 +163,13 @@ def _check_end(how: Table | PrintedFrames) -> None:
 
 
 def _check_columns(how: Any, *keys: str) -> None:
-    """Refuse anything except the names of columns or their numbers from 1."""
+    """Refuse anything except the names of columns or their numbers from 1, or 0 for none."""
     for key in keys:
         value = getattr(how, key)
         if key == "leave_out" and isinstance(value, str):
             raise refused(key, f" is {shown(value)}: must be a list of columns")
         for column in several(key, value) if key in ("columns", "leave_out") else [value] * (value is not None):
-            text(key, column) if isinstance(column, str) else integer(key, column, 1)
+            text(key, column) if isinstance(column, str) else integer(key, column, key not in ("time_column", "by"))
 
 
 @dataclass(frozen=True)
@@ -276,6 +291,9 @@ class Layout:
         The topic and its options, by the names of the arguments of `taxel.open`.
     event_camera : Reduction, optional
         What is read of an event camera's file.
+    stated : frozenset of str
+        The keys that it states, of its own, of its table or its data, also where their values are the defaults. What
+        it does not state is found as without it.
 
     Raises
     ------
@@ -299,6 +317,7 @@ class Layout:
     source: PrintedFrames | None = None
     ros: Mapping[str, Any] = field(default_factory=dict)
     event_camera: Reduction | None = None
+    stated: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if (self.rows is None) != (self.columns is None):
@@ -320,6 +339,11 @@ class Layout:
             finite("zeros_before_s", self.zeros_before_s, least=1e-6, most=60.0)
         # Refuses a pitch beside places, and places of another number than rows x columns.
         self.array(self.places.x.size if self.places is not None else 1)
+        differs = {key.name for key in fields(self) if getattr(self, key.name) != key.default}
+        for inner in (self.table, self.data):
+            if inner is not None:
+                differs |= {key.name for key in fields(inner) if getattr(inner, key.name) not in (key.default, [])}
+        object.__setattr__(self, "stated", self.stated | differs - {"path", "stated", "columns"})
 
     @classmethod
     def read(cls, path: Path) -> Layout:
@@ -453,7 +477,8 @@ def _values(document: dict[str, Any]) -> dict[str, Any]:
                 raise ProblemError(f"[{name}]: {first_line(error)}") from None
         else:
             values[name] = tuple(value) if name == "pitch_mm" and isinstance(value, list) else value
-    return values
+    within = (document[name] for name in ("table", "data") if name in document)
+    return values | {"stated": frozenset(document).union(*within)}
 
 
 #: The tables of a layout file by their names.
@@ -474,7 +499,11 @@ _AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
 def _keys(table: str) -> list[str]:
     """Return the keys of a table, "" for those that are in none; the mapping is that of a ROS bag."""
     kind = _TABLES[table] if table else Layout
-    return ["topic", "field", "ros", "by"] if kind is dict else [f.name for f in fields(kind) if f.name != "path"]
+    return (
+        ["topic", "field", "ros", "by"]
+        if kind is dict
+        else [f.name for f in fields(kind) if f.name not in ("path", "stated")]
+    )
 
 
 def _known(table: str, values: Mapping[str, Any]) -> None:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from taxel._base.errors import unreadable
 from taxel.array import Places
-from taxel.formats.layout import Layout, advice
+from taxel.formats.layout import Data, Layout, Table, advice
+from taxel.formats.roles import Changes, Question, Role, lines_of
 
 _RATE_NOT_SAID = "# rate_hz = 100  # frames per second, which the file does not state"
 
 
 def of_layout(layout: Layout) -> str:
-    r"""Return the text of a layout file: the keys that differ from their defaults.
+    r"""Return the text of a layout file: the keys that differ from their defaults, or that it states.
 
     Examples
     --------
@@ -31,16 +32,16 @@ def of_layout(layout: Layout) -> str:
     own, tables = list[str](), list[str]()
     for key in fields(layout):
         value = getattr(layout, key.name)
-        if key.name == "path" or value in (None, "") or value == {}:
+        if key.name in ("path", "stated") or value in (None, "") or value == {}:
             continue
         if is_dataclass(value) or isinstance(value, Mapping):
-            tables += ["", f"[{key.name}]", *_lines(value)]
+            tables += ["", f"[{key.name}]", *_lines(value, layout.stated)]
         else:
             own.append(f"{key.name} = {_written(value)}")
     return "\n".join([*own, *tables] if own else tables[1:]) + "\n"
 
 
-def _lines(values: Any) -> list[str]:
+def _lines(values: Any, is_stated: frozenset[str]) -> list[str]:
     """Return the lines of a table of TOML."""
     if isinstance(values, Mapping):
         return [f"{key} = {_written(value)}" for key, value in values.items()]
@@ -50,28 +51,69 @@ def _lines(values: Any) -> list[str]:
             f"{key} = {_written(column.ravel().tolist())}" for key, column in columns.items() if column is not None
         ]
         return lines + ([] if values.unit is None else [f"unit = {_written(values.unit)}"])
-    stated = ((key.name, getattr(values, key.name), key.default) for key in fields(values))
+    every = ((key.name, getattr(values, key.name), key.default) for key in fields(values))
     return [
-        f"{name} = {_written(value)}" for name, value, default in stated if value != default and value not in ([], ())
+        f"{name} = {_written(value)}"
+        for name, value, default in every
+        if value is not None and (name in is_stated or (value != default and value not in ([], ())))
     ]
 
 
-def refuse_to_choose(path: Path, why: str, choices: Mapping[str, Layout]) -> NoReturn:
-    """Refuse a file that can be read in several ways, with the layout of each and what tells it from the others.
+def refuse_open(path: Path, about: str, layout: Layout, roles: Sequence[Role], questions: Sequence[Question]) -> None:
+    """Refuse a file of which something is open: with the table of its roles, and the layout by each first answer.
+
+    Each layout leaves out the keys of the questions that are still open then.
 
     Raises
     ------
-    FormatError : always (the layouts are below its first line)
+    FormatError : there is a question (the table and the layouts are below its first line)
     """
-    lines = list[str]()
-    for number, (name, layout) in enumerate(choices.items(), 1):
-        times = (getattr(layout.table, "time_column", None), getattr(layout.table, "frame_time", None))
-        timed = any(each is not None for each in (*times, layout.rate_hz, getattr(layout.data, "time", None)))
-        lines += [f"# {number}. {name}", *([] if timed else [_RATE_NOT_SAID]), of_layout(layout)]
+    if not questions:
+        return
+    (why, keys, choices), *others = ((each.why, each.keys, each.choices) for each in questions)
+    also = "".join(f"; also open: {other}" for other, _, _ in others)
+    ways = f"{about} {len(choices)} ways ({why})" if len(choices) > 1 else why
+    later = frozenset[str]().union(*(keys for _, keys, _ in others)) - keys
+    lines = [f"# {line}" for line in lines_of(roles)]
+    for number, (name, changes) in enumerate(choices.items(), 1):
+        full = without(changed(layout, changes), later)
+        times = (getattr(full.table, "time_column", None), getattr(full.table, "frame_time", None))
+        timed = any((*times, full.rate_hz, getattr(full.data, "time", None)))
+        lines += [f"# {number}. {name}", *([] if timed else [_RATE_NOT_SAID]), of_layout(full)]
     right = advice(path, f"write {'one of these' if len(choices) > 1 else 'this'}")
-    error = unreadable(f"{why}; {right}:", path)
+    error = unreadable(f"{ways}{also}; {right}:", path)
     error.args = (*error.args, "\n".join(lines).rstrip())
     raise error
+
+
+def changed(layout: Layout, changes: Changes) -> Layout:
+    """Return a layout with other keys, of its own, its table or its data, which it states, except those of nothing."""
+    inner: dict[str, Any] = {}
+    for name, kind in (("table", Table), ("data", Data)):
+        there = getattr(layout, name)
+        if there is not None:
+            keys = {key.name for key in fields(kind)} & changes.keys()
+            inner[name] = replace(there, **{key: changes[key] for key in keys})
+    if layout.table is not None and {"left", "read"} & changes.keys():
+        left = [column for column in layout.table.leave_out if column not in changes.get("read", ())]
+        more = (column for column in changes.get("left", ()) if column not in left)
+        inner["table"] = replace(inner["table"], leave_out=[*left, *more])
+        changes = {**changes, "leave_out": "stated"}
+    known = {key.name for key in fields(Layout)} - {"columns"}
+    own = {key: value for key, value in changes.items() if key in known}
+    said = {key for key, value in changes.items() if value not in (None, [])} - {"left", "read"}
+    return replace(layout, **own, **inner, stated=layout.stated | said)
+
+
+def without(layout: Layout, keys: frozenset[str]) -> Layout:
+    """Return a layout that does not state some keys."""
+    inner: dict[str, Any] = {
+        name: replace(there, **{key.name: key.default for key in fields(there) if key.name in keys})
+        for name in ("table", "data")
+        if (there := getattr(layout, name)) is not None
+    }
+    own: dict[str, Any] = {key.name: key.default for key in fields(layout) if key.name in keys}
+    return replace(layout, **own, **inner, stated=layout.stated - keys)
 
 
 def _written(value: object) -> str:

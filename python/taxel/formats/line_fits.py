@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel.formats.column_names import UNIT_BEHIND
+from taxel.formats.layout import Layout
 from taxel.formats.lines import MISSING, THOUSANDS, Line, has_marks, is_number, number_of, read_line
 from taxel.formats.times import epoch_of, is_day, is_time
 
@@ -53,6 +54,8 @@ class Fit:
     #: The share of cells that fit, from the first frame on, and less where few of all lines are frames.
     purity: float
     score: float
+    #: The cells of lines over the rest of the file.
+    spread: Sequence[Sequence[str]] = ()
 
     @property
     def count(self) -> int:
@@ -79,10 +82,24 @@ class Fit:
     def numbers(self, column: int) -> NDArray[np.float64]:
         """Return the numbers of a column; NaN for other cells."""
         if column not in self._numbers:
-            marks = self.decimal, self.thousands
-            numbers = [number_of(cell, *marks) if is_number(cell, *marks) else np.nan for cell in self.cells(column)]
-            self._numbers[column] = np.array(numbers)
+            self._numbers[column] = np.array(list(map(self._number, self.cells(column))))
         return self._numbers[column]
+
+    def wide(self, column: int) -> NDArray[np.float64]:
+        """Return the numbers of a column, and of it over the rest of the file; NaN for other cells."""
+        more = [self._number(cells[column]) for cells in self.spread]
+        return np.concatenate([self.numbers(column), np.array(more, np.float64)])
+
+    def _number(self, cell: str) -> float:
+        marks = self.decimal, self.thousands
+        return number_of(cell, *marks) if is_number(cell, *marks) else np.nan
+
+    def over(self, lines: Iterable[str]) -> Fit:
+        """Return the same with lines over the rest of the file, those that have as many cells."""
+        read = (read_line(line, self.kind, self.separator, self.decimal) for line in lines)
+        names = self.lines[self.body[0]][1].names
+        whole = (line.in_order(names).cells for line in read if line is not None)
+        return replace(self, spread=[cells for cells in whole if len(cells) == self.count])
 
     def ascends(self, column: int) -> bool:
         """Return whether a column ascends as times do, of which some may repeat, wrap or be out of order."""
@@ -103,16 +120,30 @@ class Fit:
 
 
 def fits_in(
-    lines: Sequence[str], all_lines: Callable[[], Iterable[str]], wanted: int | None = None
+    lines: Sequence[str],
+    all_lines: Callable[[], Iterable[str]],
+    wanted: int | None = None,
+    stated: Layout | None = None,
 ) -> tuple[list[Fit], bool]:
     """Return the forms that fit lines, and whether they may as well be hexadecimal numbers, as `all_lines` do not say.
 
-    Of a number of columns that is `wanted`, where any line has it.
+    Of a number of columns that is `wanted`, where any line has it, and in the form that a layout states.
     """
-    in_hex, is_sure = _hex(all_lines, lines)
-    if is_sure and in_hex is not None:
-        return [in_hex], False
-    return list(fits_of(lines, _FORMS, (), wanted)), in_hex is not None
+    how = stated.table if stated is not None else None
+    if stated is None or how is None or stated.stated.isdisjoint(("separator", "lines", "decimal")):
+        in_hex, is_sure = _hex(all_lines, lines)
+        if is_sure and in_hex is not None:
+            return [in_hex], False
+        missing = () if how is None else how.missing_texts
+        return list(fits_of(lines, _FORMS, missing, wanted)), in_hex is not None
+    keys = {"lines": 0, "separator": 1, "decimal": 2}
+    forms = [
+        form for form in _FORMS if all(form[k] == getattr(how, key) for key, k in keys.items() if key in stated.stated)
+    ]
+    if not forms or ("lines" not in stated.stated and "separator" in stated.stated):
+        forms = [form for form in forms if form[0] == "plain"] or [(how.lines, how.separator, how.decimal)]
+    is_said = not stated.stated.isdisjoint(("decimal", "thousands"))
+    return list(fits_of(lines, forms, how.missing_texts, wanted, how.thousands, is_said=is_said)), False
 
 
 def fits_of(
@@ -121,10 +152,12 @@ def fits_of(
     missing: Sequence[str] = (),
     wanted: int | None = None,
     thousands: str | None = None,
+    *,
+    is_said: bool = False,
 ) -> Iterator[Fit]:
     """Yield each form that makes columns of numbers of the lines, as many as are wanted where any line has them.
 
-    Of several forms each finds its mark between thousands.
+    Each finds its mark between thousands, unless that is said.
     """
     there = [(k, line) for k, line in enumerate(lines) if line.strip(" \t\r,;")]
     few = [line for _, line in there[-40:]]
@@ -143,7 +176,7 @@ def fits_of(
         if kind != "plain" and cells:
             names = Counter(line.names for _, line in cells).most_common(1)[0][0]
             cells = [(k, line.in_order(names)) for k, line in cells]
-        mark = _thousands(cells, decimal) if len(forms) > 1 and kind == "plain" else thousands
+        mark = _thousands(cells, decimal) if kind == "plain" and not is_said else thousands
         fit = _fit((kind, separator, decimal), mark, cells, len(there), {*MISSING, *missing}, wanted)
         if fit is not None:
             yield fit

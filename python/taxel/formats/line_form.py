@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.formats.column_names import time_unit
 from taxel.formats.form import Form, place_of, places_of
-from taxel.formats.layout import PrintedFrames
+from taxel.formats.layout import Layout, PrintedFrames
 from taxel.formats.line_fits import FITS, fits_in
 from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, said_of, taxels_of, time_of
 from taxel.formats.table_form import draft_of, lines_between_blanks
@@ -70,7 +72,7 @@ def form_of_lines(
         unit = _unit_of_stated(draft, stated.time or "", times, unit_of)
         draft.set(time_column=stated.time and stated.time.partition(":")[0], time_unit=unit)
     elif not is_whole:
-        time = time_of(draft, is_stated=not are_taxels)
+        time = time_of(draft, by_name=not are_taxels)
         if time is not None and time not in left:
             times = places_of(names, "time", draft.table.time_column or 0)
             ask_for_lines_of_one_time(draft, time)
@@ -81,16 +83,20 @@ def form_of_lines(
             draft.set(time_column=None)
     time = next(iter(times), None)
     if is_whole or stated.leave_out or stated.columns or not are_taxels:
-        draft.asked.clear()
-        draft.left.update((k, "texts") for k, kind in enumerate(fit.types) if kind == "text")
+        draft.questions.clear()
+        draft.be("no taxel", "texts", *(k for k in range(len(draft.names)) if fit.types[k] == "text"))
         taxels = [k for k in range(len(draft.names)) if k not in {*left, *times, *draft.left}]
     else:
         taxels = [k for k in taxels_of(draft, time) if k not in left]
         taxels = by_key(draft, time, taxels, lambda: lines)
     if not taxels:
         raise ProblemError("lines have no column of values, only times and columns that are left out")
-    if draft.asked or draft.table.taxel_column is not None:
-        why = draft.asked[0][0] if draft.asked else f"column {draft.table.taxel_column} names the taxel of each line"
+    if draft.questions or draft.table.taxel_column is not None:
+        why = (
+            draft.questions[0].why
+            if draft.questions
+            else f"column {draft.table.taxel_column} names the taxel of each line"
+        )
         raise ProblemError(f"{why}: state what it is by time=COLUMN:UNIT, leave_out= or frame_lines=")
     gone = sorted(set(draft.left) - left - {*times} - {*taxels})
     if gone and are_taxels:
@@ -107,13 +113,13 @@ def _reading_of_lines(lines: Sequence[str], stated: PrintedFrames, size: int | N
     fits = sorted(found, key=lambda fit: (wanted is not None and fit.count != wanted, -fit.score))
     if not fits or fits[0].purity < FITS * (not stated.leave_out):
         return None
-    draft = draft_of(fits[0], lines)
+    draft = draft_of(fits[0], lines, Layout(Path(stated.place)))
     if stated.columns:
         if len(stated.columns) != len(draft.names):
             here = f"lines have {counted(len(draft.names), 'column')}"
             raise ProblemError(f"columns={':'.join(map(str, stated.columns))}: {here}; must be as many")
-        draft.names = tuple(map(str, stated.columns))
-    draft.asked.clear()
+        draft = replace(draft, names=tuple(map(str, stated.columns)))
+    draft.questions.clear()
     return draft
 
 
@@ -158,4 +164,4 @@ def _set_found_unit(
     by_arrival = unit_of(fit.numbers(time), [fit.lines[k][0] for k in fit.body])
     if by_arrival or is_sure:
         draft.set(time_unit=by_arrival or unit)
-        draft.answer("the unit of the time")
+        draft.answer("time_unit")

@@ -18,18 +18,28 @@ from taxel.formats.column_names import UNIT_BEHIND
 
 #: How the cells of a line are found: between separators; where marks and names are between them too; JSON; hex.
 KINDS = ("plain", "marked", "json", "hex")
-#: Cells that tables hold where a value is missing.
-MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "-", "--", "null", "NULL", "None")
+#: Cells that tables hold where a value is missing: the usual ones, and those of spreadsheets and of overflows.
+USUAL = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "-", "--", "null", "NULL", "None")
+MISSING = (
+    *USUAL,
+    *("?", "OVF", "OVR", "OL", "inf", "-inf", "+inf", "Inf", "-Inf", "INF", "-INF"),
+    *("#N/A", "#NA", "#DIV/0!", "#VALUE!", "#REF!", "#NUM!", "#NV"),
+)
 
 #: Marks between the thousands of a number, as countries have them.
-THOUSANDS = (".", ",", "'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}")
+THOUSANDS = (".", ",", "'", "’", " ", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}")
 OTHER = {".": ",", ",": "."}
 #: What is odd about a line with thousands where none are known.
 WITH_THOUSANDS = "with a number with thousands"
+#: What is odd about a line of which a reading is no number; the others may be read.
+WITH_TEXT = "with a cell that is no number"
 
+#: A minus may be that of texts.
+_MINUS = "\N{MINUS SIGN}"
+_SIGN = rf"[+\-{_MINUS}]?"
 _NUMBERS = {
-    ".": re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII),
-    ",": re.compile(r"[+-]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][+-]?\d+)?", re.ASCII),
+    ".": re.compile(rf"{_SIGN}(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII),
+    ",": re.compile(rf"{_SIGN}(?:\d+(?:,\d+)?|,\d+)(?:[eE][+-]?\d+)?", re.ASCII),
 }
 _ARROW = re.compile(r"[-=~]+>|:=|(?<=\d):(?=\s)")
 _MARKS = str.maketrans(dict.fromkeys("[](){}<>|\"'", " "))
@@ -128,7 +138,7 @@ def is_number(cell: str, decimal: str = ".", thousands: str | None = None) -> bo
 def _grouped(decimal: str, thousands: str) -> re.Pattern[str]:
     """Return the pattern of a number with marks between all of its thousands."""
     behind, between = map(re.escape, (decimal, thousands))
-    return re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{between}\d{{3}})+(?:{behind}\d+)?", re.ASCII)
+    return re.compile(rf"{_SIGN}[1-9]\d{{0,2}}(?:{between}\d{{3}})+(?:{behind}\d+)?", re.ASCII)
 
 
 def number_of(cell: str, decimal: str, thousands: str | None) -> float:
@@ -139,7 +149,7 @@ def number_of(cell: str, decimal: str, thousands: str | None) -> float:
     >>> number_of("1.234,5", ",", "."), number_of("-1,234", ".", ",")
     (1234.5, -1234.0)
     """
-    bare = cell if thousands is None else cell.replace(thousands, "")
+    bare = (cell if thousands is None else cell.replace(thousands, "")).replace(_MINUS, "-")
     return float(bare.replace(",", ".") if decimal == "," else bare)
 
 

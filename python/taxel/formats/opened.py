@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from taxel.events import Events
 from taxel.formats.column_names import AXES
 from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
+from taxel.formats.roles import Role
 from taxel.frames import Frames
 from taxel.labels import Note, source_of
 from taxel.reading import Facts, InMemory, Marks
@@ -32,6 +33,7 @@ def readers_of(
     timed: bool,
     lost: Sequence[str] = (),
     notes: Mapping[str, Sequence[Note]] | None = None,
+    roles: Sequence[Role] = (),
 ) -> list[InMemory]:
     """Return a reader of each source of a file of another program.
 
@@ -51,10 +53,20 @@ def readers_of(
         What was left out, one line each.
     notes : mapping from str to sequence of Note, optional
         Of the column of labels, by source.
+    roles : sequence of Role
+        What its columns or axes are.
     """
     if said:
         warn(f"{path.name}: read as {_size_of(sources)}: {'; '.join(said)}", stacklevel=6)
-    facts = Facts(path=path, array=Array(1, 1), kind=kind, timed=timed, lost=tuple(lost), layout=of_layout(layout))
+    facts = Facts(
+        path=path,
+        array=Array(1, 1),
+        kind=kind,
+        timed=timed,
+        lost=tuple(lost),
+        layout=of_layout(layout),
+        roles=tuple(map(asdict, roles)),
+    )
 
     def named(name: str) -> Facts:
         side = name if name in ("left", "right") else ""

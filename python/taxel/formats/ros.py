@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import reduce
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +24,7 @@ from taxel._base.errors import helped, refused, unreadable
 from taxel._base.messages import counted, first_line, installing, warn
 from taxel._core import Error, FormatError, ProblemError
 from taxel.array import Array
+from taxel.formats.column_names import is_key
 from taxel.formats.times import repaired
 from taxel.frames import Frames
 from taxel.labels import source_of
@@ -35,6 +36,8 @@ __all__ = ["Topic", "is_bag", "read_ros", "topics"]
 _ROS1, _SQLITE = b"#ROSBAG V", b"SQLite format 3\0"
 #: The first bytes of a .mcap: its magic and the code of the header, before the header's length and its profile.
 _MCAP = b"\x89MCAP0\r\n\x01"
+#: So many different texts are names of sensors.
+_KEYS = 16
 #: So many messages of a topic are looked at for numbers.
 _FIRST = 1000
 #: A stamp that is further from the bag's time of its message is wrong, ns; stamps count if so many are right.
@@ -297,12 +300,16 @@ def _listed(name: str, value: Any, kind: type[Any]) -> list[Any]:
 
 
 class _Message(NamedTuple):
-    """What is read of a message: its times by the bag and by its stamp, ns; `key` is the value of the field `by`."""
+    """What is read of a message: its times by the bag and by its stamp, ns; `key` is the value of the field `by`.
+
+    `texts` are of fields that may say which sensor it is of, if `by` is not stated.
+    """
 
     values: NDArray[Any]
     at: int
     stamp: int
     key: str
+    texts: tuple[Any, ...]
 
 
 def read_ros(
@@ -322,7 +329,7 @@ def read_ros(
     array, topic, field, ros
         As of `taxel.open`.
     by : str, optional
-        A field whose value says which sensor a message is of: each value is a source.
+        A field whose value says which sensor a message is of: each value is a source; "": all are of one.
 
     Raises
     ------
@@ -371,13 +378,19 @@ def _readers(
     """Yield the frames of a topic, those of each key apart."""
     location = f"{path}: topic {topic}" + f", field {field}" * bool(field)
     kind, names, trouble, messages = "", tuple[str, ...](), "", list[_Message]()
+    # A message has names where the first with values has some.
+    keys: dict[str, list[str]] | None = None
+    are_named = True
     for connection, at, data in bag.messages([each for each in bag.connections if each.topic == topic]):
         message = bag.deserialize(data, connection.msgtype)
         kind = _type(message)
         try:
             field = _only_field(message) if field is None else field
-            values, names = _ordered(message, field, names)
-            key = "" if by is None else str(reduce(getattr, by.split("."), message))
+            values, names = _ordered(message, field, names, are_named=are_named)
+            if values.size and keys is None:
+                keys = {name: name.split(".") for name in _texts(message)} if by is None else {}
+                are_named = bool(names)
+            key = "" if not by else str(reduce(getattr, by.split("."), message))
         except LookupError as error:
             values, key, trouble = np.empty(0), "", str(error.args[0])
         except AttributeError:
@@ -385,11 +398,14 @@ def _readers(
         except FormatError as error:
             raise FormatError(f"{location}: {error}") from None
         stamp = getattr(getattr(message, "header", None), "stamp", None)
-        messages.append(_Message(values, at, 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec), key))
+        ns = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
+        texts = tuple([reduce(getattr, steps, message) for steps in (keys or {}).values()])
+        messages.append(_Message(values, at, ns, key, texts))
     # Files of a bag may overlap.
     whole = sorted((each for each in messages if each.values.size), key=lambda each: each.at)
     if not whole:
         raise FormatError(f"{location}: {trouble or 'contains no message with values'}")
+    _refuse_mixed(location, [*(keys or {})], [message.texts for message in whole if message.texts])
     shape = _shape(whole) if array is None else array.shape
     # What states other rows and columns than those of one row does not fit.
     fits = [m for m in whole if m.values.shape in (shape, (math.prod(shape),), (1, math.prod(shape)))]
@@ -432,7 +448,9 @@ def _only_field(message: Any) -> str:
     return there[0]
 
 
-def _ordered(message: Any, field: str, known: tuple[str, ...]) -> tuple[NDArray[Any], tuple[str, ...]]:
+def _ordered(
+    message: Any, field: str, known: tuple[str, ...], *, are_named: bool = True
+) -> tuple[NDArray[Any], tuple[str, ...]]:
     """Return the numbers of a field in the order of `known` names, and these: those of the message if none are known.
 
     Raises
@@ -444,13 +462,58 @@ def _ordered(message: Any, field: str, known: tuple[str, ...]) -> tuple[NDArray[
     except LookupError:
         there = ", ".join(_numbers(message)) or "none"
         raise LookupError(f"the field has no numbers; fields with numbers: {there}") from None
-    for named in ("name", "names", "channels", "channel_names"):
-        names = getattr(message, named, None)
-        if isinstance(names, list) and len(names) == numbers.size and all(isinstance(n, str) for n in names):
-            known = known or tuple(names)
-            is_same = sorted(names) == sorted(known)
-            return numbers[[names.index(name) for name in known]] if is_same else np.empty(0), known
-    return numbers, known
+    names = _names(message, field) if are_named else []
+    if not names:
+        return numbers, known
+    known = known or tuple(names)
+    is_same = sorted(names) == sorted(known)
+    return numbers.reshape(-1)[[names.index(name) for name in known]] if is_same else np.empty(0), known
+
+
+def _names(message: Any, path: str) -> list[str]:
+    """Return a name for each number of a field, if a list beside it or above it, or the parts of a list, state them."""
+    step, _, rest = path.partition(".")
+    found = list[str]()
+    if isinstance(message, list) and not step.isdecimal():
+        for part in message:
+            size = _values(part, path).size
+            own = next((value for value in _texts(part).values() if value), "")
+            found += [own if size == 1 else f"{own}[{k}]" for k in range(size)] if own else _names(part, path)
+    elif step:
+        size = _values(message, path).size
+        lists = [getattr(message, each.name) for each in fields(message)] if is_dataclass(message) else []
+        texts = (each for each in lists if isinstance(each, list) and len(each) == size)
+        found = next((each for each in texts if all(isinstance(name, str) for name in each)), [])
+        inner = message[int(step)] if isinstance(message, list) else getattr(message, step)
+        found = found or (_names(inner, rest) if rest or isinstance(inner, list) else [])
+    return found if len({*found}) == len(found) else []
+
+
+def _texts(message: Any, path: str = "") -> dict[str, Any]:
+    """Return the fields of a message that may say which sensor it is of: texts, and numbers with such a name."""
+    found: dict[str, Any] = {}
+    for each in fields(message) if is_dataclass(message) else ():
+        value, name = getattr(message, each.name), f"{path}.{each.name}".lstrip(".")
+        if isinstance(value, str) or (isinstance(value, int | np.integer) and is_key(each.name)):
+            found[name] = value
+        elif is_dataclass(value) and not isinstance(value, list):
+            found |= _texts(value, name)
+    return found
+
+
+def _refuse_mixed(location: str, names: Sequence[str], texts: Sequence[Sequence[Any]]) -> None:
+    """Refuse messages of several sensors in turn, with the field that says which each is of; its texts are given.
+
+    Raises
+    ------
+    FormatError : there is such a field
+    """
+    for name, values in zip(names, zip(*texts, strict=True), strict=False):
+        known = sorted(map(str, set(values)))
+        in_turn = 3 * sum(a != b for a, b in pairwise(values)) > len(values)
+        if 1 < len(known) <= _KEYS and in_turn and len(values) > len(known):
+            right = f"write by = {name!r}, each a source, or by = '', all of one, in [ros] of a layout file"
+            raise FormatError(f"{location}: the messages are of {', '.join(known[:4])} in turn ({name}): {right}")
 
 
 def _shape(whole: Sequence[_Message]) -> tuple[int, int]:

@@ -7,6 +7,7 @@ import warnings
 from array import array
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -25,8 +26,9 @@ from taxel.formats.checks import around
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout
-from taxel.formats.lines import MISSING, OTHER, WITH_THOUSANDS, OddLines, is_number, read_line
+from taxel.formats.lines import MISSING, OTHER, USUAL, WITH_TEXT, WITH_THOUSANDS, OddLines, is_number, read_line
 from taxel.formats.opened import readers_of, sources_of
+from taxel.formats.parts import parts_of
 from taxel.formats.table_columns import EVENT_COLUMNS
 from taxel.formats.table_form import form_of
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
@@ -76,7 +78,9 @@ class Rows:
     def joined(self) -> Rows:
         """Return the same with seconds and nanoseconds as one time, and row and column as one name of a taxel."""
         beside = self.beside
-        if "nanoseconds" in beside:
+        if "nanoseconds" in beside and isinstance(beside["time"].iloc[0], str):
+            beside["time"] += "." + beside.pop("nanoseconds")
+        elif "nanoseconds" in beside:
             beside["time"] = beside["time"].astype("int64") * 10**9 + beside.pop("nanoseconds").astype("int64")
         if "column" in beside:
             beside["taxel"] += " " + beside.pop("column")
@@ -107,19 +111,37 @@ def read_table(
     FormatError : no table, one that differs from its layout, or one that can be read in two ways (prints both)
     ImportError : the extra ``tables`` is not installed
     """
-    text = Text(path)
+    parts, others = parts_of(Text(path), layout.table)
+    more = [f"other sheets: {', '.join(others)}"] * bool(others)
+    return [each for name, text in parts.items() for each in _read_part(name, text, layout, array, label_column, more)]
+
+
+def _read_part(
+    part: str,
+    text: Text,
+    layout: Layout,
+    array: Array | None,
+    label_column: str | int | None,
+    more: Sequence[str],
+) -> list[InMemory]:
+    """Return a reader of each source of one of the tables of a file; `more` is what of the file is not read."""
+    path = text.path
     form, full = form_of(text, layout, label_column)
     how, columns, sources = form.table, form.columns, dict[str, Frames | Events]()
     rows = read_rows(text, form)
     read = {*columns.times, columns.label, columns.by, *columns.taxel, *columns.taxels}
     left = [form.called(k) for k in range(len(form.names)) if k not in read]
-    lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
-    said, notes = [*form.said, *rows.odd.said()], dict[str, list[Note]]()
+    lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said(), *more]
+    said, notes = [*form.said, *rows.odd.said(), *more], dict[str, list[Note]]()
     if how.events:
-        sources = {"": _events(path, full, form, rows, array)}
+        sources = {part: _events(path, full, form, rows, array)}
+        shape = sources[part].array.shape
+        if array is None and layout.rows is None:
+            said.append(f"{shape[0]} x {shape[1]} taxels assumed, which the table does not state")
     else:
         values, names = _frames_of_lines(path, full, form, rows, said), [form.names[k] for k in columns.taxels]
-        empty = np.isnan(values).all(axis=(0, 1)) if form.said and values.shape[1] == 1 else np.zeros(1, bool)
+        is_found = layout.stated.isdisjoint(("leave_out", "keep")) and values.shape[1] == 1
+        empty = np.isnan(values).all(axis=(0, 1)) if is_found else np.zeros(1, bool)
         if empty.any() and not empty.all():
             places = [columns.taxels[k] for k in np.flatnonzero(empty)]
             said.append(f"{', '.join(map(form.called, places))} left out: empty")
@@ -137,11 +159,11 @@ def read_table(
                 t, order = in_order(path, beside["time"], form.unit_of_times, said)
             if order is not None:
                 of_part, beside = of_part[order], beside.iloc[order]
-            own = dict(sources_of(path, full, key, of_part, t, names if any(names) else None))
+            own = dict(sources_of(path, full, f"{part} {key}".strip(), of_part, t, names if any(names) else None))
             sources |= own
             notes |= dict.fromkeys(own, _labels(form, beside, t))
-    said = said if form.said else []
-    return readers_of(path, "table", sources, full, said, timed=rows.times is not None, lost=lost, notes=notes)
+    timed = rows.times is not None
+    return readers_of(path, "table", sources, full, said, timed=timed, lost=lost, notes=notes, roles=form.roles)
 
 
 def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
@@ -192,7 +214,9 @@ def _parsed(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     beside, mark = _beside(form), how.separator
     # Kinds of numbers that are stated, not found, take pandas half as long again.
     kinds: dict[int, Any] = {k: str for k in beside.values() if k not in times or how.time_unit == ISO}
-    missing = list(form.missing)
+    # Each takes pandas time; a rare one that comes only later is read line by line.
+    head = "\n".join(text.head)
+    missing = [cell for cell in form.missing if cell in USUAL or cell in head]
     # Separators may end lines; a later line with more cells than the first is an error to pandas.
     first = read_line(text.head[form.first], "plain", mark)
     width = max(count, len(first.cells) if first is not None else 0)
@@ -203,24 +227,29 @@ def _parsed(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     places: Any = slice(taxels[0], taxels[-1] + 1) if taxels[-1] - taxels[0] + 1 == len(taxels) else taxels
     values, others = list[NDArray[np.float32]](), list[Any]()
     # A value that 32 bits do not hold is infinite.
-    with text.opened() as file, np.errstate(over="ignore"):
+    with ExitStack() as stack, np.errstate(over="ignore"):
+        file = stack.enter_context(text.opened()) if text.typed is None else None
         # Rows that pandas skips take it a third longer, and so do blanks, which no number needs to be without.
-        deque(islice(file, form.first), 0)
-        chunks = pd.read_csv(
-            file,
-            sep=r"\s+" if mark == " " else mark,
-            header=None,
-            names=range(width),
-            index_col=False,
-            dtype=kinds,
-            decimal=how.decimal,
-            na_values=cells,
-            keep_default_na=False,
-            skipinitialspace=mark != " " and any(f"{mark} " in f"{mark}{line}" for line in text.head),
-            # An empty line may not be within a frame of so many lines.
-            skip_blank_lines=how.frame_lines is None,
-            chunksize=max(1, _CELLS // width),
-            low_memory=False,
+        deque(islice(file or (), form.first), 0)
+        chunks = (
+            _as_typed(text, form)
+            if file is None
+            else pd.read_csv(
+                file,
+                sep=r"\s+" if mark == " " else mark,
+                header=None,
+                names=range(width),
+                index_col=False,
+                dtype=kinds,
+                decimal=how.decimal,
+                na_values=cells,
+                keep_default_na=False,
+                skipinitialspace=mark != " " and any(f"{mark} " in f"{mark}{line}" for line in text.head),
+                # An empty line may not be within a frame of so many lines.
+                skip_blank_lines=how.frame_lines is None,
+                chunksize=max(1, _CELLS // width),
+                low_memory=False,
+            )
         )
         for chunk in chunks:
             part = chunk.iloc[:, places]
@@ -240,6 +269,14 @@ def _parsed(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     if how.time_unit != ISO and any(kind.kind not in "iuf" for kind in of_times.dtypes):
         return None
     return rows.joined()
+
+
+def _as_typed(text: Text, form: Form) -> Iterator[Any]:
+    """Yield the rows of a typed table with columns by their places, as those of a text are; texts where they count."""
+    table = text.typed.set_axis(range(text.typed.shape[1]), axis=1).iloc[form.first - 1 :]
+    is_iso = form.table.time_unit == ISO
+    texts = [k for k in _beside(form).values() if is_iso or k not in form.columns.times]
+    yield table.astype(dict.fromkeys(texts, str)).reset_index(drop=True)
 
 
 def _beside(form: Form) -> dict[str, int]:
@@ -268,7 +305,7 @@ def _line_by_line(text: Text, form: Form) -> Rows:
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
         if number <= form.first and not is_begin:
             continue
-        if is_begin or how.is_between(line) or (how.has_lines and not line.strip(f"\t ;,{how.separator}")):
+        if is_begin or how.is_between(line) or not line.strip(f"\t ;,{how.separator}"):
             waiting = True
             if is_begin and how.frame_time is not None:
                 found = _NUMBER.findall(line)
@@ -282,8 +319,9 @@ def _line_by_line(text: Text, form: Form) -> Rows:
             right = f"write thousands = {OTHER[how.decimal]!r} in [table] of the layout, as lines above show none"
             raise unreadable(f"a number has thousands; {right}", text.path, line=number)
         if odd:
-            rows.odd.add(odd, number)
+            rows.odd.add(f"{odd}, which is missing" if read else odd, number)
             last = number
+        if not read:
             continue
         values.extend([read[k] for k in taxels] if len(taxels) < len(read) else read)
         rows.numbers.append(number)
@@ -295,7 +333,7 @@ def _line_by_line(text: Text, form: Form) -> Rows:
     kinds = "; ".join(rows.odd.said())
     if not rows.numbers:
         raise unreadable(f"contains no line of numbers{': ' * bool(kinds)}{kinds}", text.path)
-    total = len(rows.numbers) + rows.odd.total
+    total = len(rows.numbers) + rows.odd.total - rows.odd.counts[f"{WITH_TEXT}, which is missing"]
     if rows.odd.total > max(FEW_ODD, ODD * total) or rows.odd.total >= len(rows.numbers):
         first = min(rows.odd.first.values())
         raise unreadable(f"{rows.odd.total} of {total} lines are no frames: {kinds}", text.path, line=first)

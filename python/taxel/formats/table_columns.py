@@ -1,4 +1,4 @@
-"""What each column of a table is: the time and its unit, taxels, events, labels; and what is left out, and why."""
+"""The role of each column of a table: the time and its unit, taxels, events, labels; what is none, and why."""
 
 from __future__ import annotations
 
@@ -7,47 +7,71 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice, pairwise
-from typing import Any, TypeAlias
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.table_text import Text
 from taxel.formats import column_names
 from taxel.formats.column_names import time_unit
-from taxel.formats.form import places_of
-from taxel.formats.layout import Table
+from taxel.formats.form import left_out, places_of
+from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
+from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named
 from taxel.formats.times import ISO, is_of_two_numbers, unit_of_times
 
-#: So many lines show that an unnamed column ascends as times do, and that one counts lines.
-_ASCENDS, _COUNTS = 8, 20
-#: So many different texts are names of sensors, not remarks.
-_KEYS = 16
+#: So many lines show that an unnamed column ascends as times do, that one counts lines, and what values stay.
+_ASCENDS, _COUNTS, _STAYS = 8, 20, 40
+#: So many different texts are names of sensors, not remarks; so many whole values are those of labels.
+_KEYS, _LABELS = 16, 5
+#: Of so many columns each block is tried as the parts of a total; of more those that begin at the first.
+_BLOCKS = 64
+#: So many columns with names that differ in a number are a series.
+_SERIES = 4
 #: A number with other text behind it, which is no date, time or address.
 _GLUED = re.compile(r"[-+]?\d+(?:[.,]\d+)?[ \t]*[^\s\d:/.,-]")
 #: Names of the columns of events.
 EVENT_COLUMNS = {"col": "x", "column": "x", "row": "y", "pol": "p", "polarity": "p", "on": "p"}
-#: What is changed in a layout: keys of it or of its table; `left` and `read` are columns more to leave out, or fewer.
-Changes: TypeAlias = Mapping[str, Any]
 
 
 @dataclass
 class Draft:
-    """Hold what is understood of a table as it is looked at: its layout, what was left out and why, what is open."""
+    """Hold what is understood of a table as it is looked at: its layout, the role of each column, what is open."""
 
     fit: Fit
     table: Table
     names: tuple[str, ...]
     units: tuple[str, ...]
-    left: dict[int, str] = field(default_factory=dict)
+    #: What is stated of it.
+    layout: Layout
     said: list[str] = field(default_factory=list)
-    #: What two layouts differ in, and how, with a comment for each.
-    asked: list[tuple[str, Mapping[str, Changes]]] = field(default_factory=list)
+    questions: list[Question] = field(default_factory=list)
     #: The column that names the sensor or the taxel of each line; rows and columns of taxels that two columns name.
     key: int | None = None
     size: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        self.roles = [
+            Role(name or f"column {k + 1}", self.fit.cells(k)[:FIRST], unit=unit)
+            for k, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
+        ]
+
+    @property
+    def left(self) -> dict[int, str]:
+        """Why each column is left out that is."""
+        return {k: role.why for k, role in enumerate(self.roles) if role.is_left}
+
+    @cached_property
+    def stated_left(self) -> set[int]:
+        """The columns that the layout leaves out."""
+        return set() if self.layout.table is None else left_out(self.names, self.layout.table)
+
+    def is_stated(self, *keys: str) -> bool:
+        """Return whether the layout states one of these keys."""
+        return not self.layout.stated.isdisjoint(keys)
 
     def called(self, column: int) -> str | int:
         """Return how a layout names a column: by its name, or, without a name of its own, by its number from 1."""
@@ -58,28 +82,88 @@ class Draft:
     def _counts(self) -> Counter[str]:
         return Counter(self.names)
 
-    def ask(self, why: str, choices: Mapping[str, Changes], *, first: bool = False) -> None:
-        """Add a question: what is open, and what each answer changes; the `first` one is printed with its layouts."""
-        self.asked.insert(0 if first else len(self.asked), (why, choices))
+    def be(self, role: str, why: str, *columns: int, certainty: str = LIKELY) -> None:
+        """Give columns their role; what is open stays open."""
+        for k in columns:
+            doubt = OPEN if self.roles[k].certainty == OPEN else certainty
+            self.roles[k] = replace(self.roles[k], role=role, why=why, certainty=doubt)
 
-    def answer(self, why: str) -> None:
-        """Remove the questions that begin so, as something else answers them."""
-        self.asked = [each for each in self.asked if not each[0].startswith(why)]
+    def ask(self, why: str, keys: str, choices: Mapping[str, Changes], *columns: int, first: bool = False) -> None:
+        """Add a question: what is open, the keys that answer it, what each answer changes, and of which columns.
+
+        The `first` one is printed with its layouts.
+        """
+        question = Question(why, frozenset(keys.split()), choices)
+        if question.keys & self.layout.stated:
+            return
+        self.questions.insert(0 if first else len(self.questions), question)
+        for k in columns:
+            self.roles[k].certainty = OPEN
+            self.roles[k].why = self.roles[k].why or why
+
+    def answer(self, key: str) -> None:
+        """Remove the questions that a key answers, as something else does."""
+        self.questions = [each for each in self.questions if key not in each.keys]
 
     def set(self, **keys: Any) -> None:
         """Set keys of the table."""
         self.table = replace(self.table, **keys)
 
 
-def time_of(draft: Draft, *, is_stated: bool) -> int | None:
-    """Return the column of times that fits best, and say its unit; None without one.
+def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
+    """Return the column of times that is stated or fits best, and say its unit; None without one.
 
-    Where a layout states the sensor or the rate, a column is one of times by its name or its cells alone.
+    With `by_name` it is one by its name or its cells alone.
     """
     fit, names = draft.fit, draft.names
+    column, others = _stated_time(draft), list[int]()
+    if column is None and not draft.is_stated("time_column"):
+        column, others = _named_time(draft)
+        if column is None and draft.table.frame_time is None and not by_name and fit.kind != "hex":
+            column = _unnamed_time(draft)
+    if column is None:
+        return None
+    draft.be("no taxel", "another time", *others)
+    is_two = "+" in str(draft.table.time_column or "") and draft.is_stated("time_column")
+    if not draft.is_stated("time_unit"):
+        is_text = fit.types[column] == "time"
+        draft.set(time_unit=ISO if is_text else "s" if is_two else _unit_of_time(draft, column))
+        if is_text and all(map(is_of_two_numbers, fit.cells(column))):
+            example = fit.cells(column)[-1]
+            why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
+            draft.ask(why, "time_unit", {"hours and minutes": {"time_unit": ISO}}, column)
+    if draft.is_stated("time_column"):
+        return column
+    is_sure = column_names.is_time(names[column]) and fit.ascends(column)
+    draft.be("time", draft.roles[column].why or "named so", column, certainty=SURE if is_sure else LIKELY)
+    draft.set(time_column=draft.called(column))
+    if _has_milliseconds(fit, column):
+        draft.set(time_column=f"{draft.called(column)}+{draft.called(column + 1)}")
+        draft.be("time", "milliseconds behind a comma", column + 1)
+        return column
+    seconds = next((k for k in (column, column - 1) if _has_nanoseconds(draft, k)), None)
+    if seconds is None:
+        return column
+    draft.set(time_column=f"{draft.called(seconds)}+{draft.called(seconds + 1)}", time_unit="s")
+    draft.be("time", "seconds and nanoseconds", seconds, seconds + 1, certainty=SURE)
+    draft.answer("time_unit")
+    return seconds
+
+
+def _stated_time(draft: Draft) -> int | None:
+    """Return the first column of times that the layout states; None if it states none."""
+    stated = draft.table.time_column if draft.is_stated("time_column") else None
+    places = places_of(draft.names, "time_column", stated) if stated else ()
+    draft.be("time", "stated", *places, certainty=SURE)
+    return next(iter(places), None)
+
+
+def _named_time(draft: Draft) -> tuple[int | None, list[int]]:
+    """Return the column that is the time by its name or its cells, and others that are times too."""
+    fit, names, left = draft.fit, draft.names, draft.stated_left
     scores: dict[int, int] = {}
     for k in range(len(names)):
-        if fit.types[k] not in ("number", "time"):
+        if fit.types[k] not in ("number", "time") or k in left:
             continue
         # A letter may be the name of a taxel too: it is the time where it comes first, or ascends.
         is_called = column_names.is_time(names[k]) and (k == 0 or len(names[k]) > 1)
@@ -90,26 +174,16 @@ def time_of(draft: Draft, *, is_stated: bool) -> int | None:
         elif draft.table.frame_time is None and fit.count > 1 and fit.ascends(k) and fit.epoch(k):
             scores[k] = 2
     # Of two clocks one may be in whole seconds.
-    column = max(scores, key=lambda k: (scores[k], 2 * len(set(fit.cells(k))) > len(fit.body), -k), default=None)
-    draft.left.update(dict.fromkeys((k for k in scores if k != column and scores[k] >= 4), "another time"))
-    if column is None and draft.table.frame_time is None and not is_stated and fit.kind != "hex":
-        column = _unnamed_time(draft)
-    if column is None:
-        return None
-    unit = ISO if fit.types[column] == "time" else _unit_of_time(draft, column)
-    draft.set(time_column=draft.called(column), time_unit=unit)
-    if unit == ISO and all(map(is_of_two_numbers, fit.cells(column))):
-        example = fit.cells(column)[-1]
-        why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
-        draft.ask(why, {"hours and minutes": {}})
-    seconds = next((k for k in (column, column - 1) if _has_nanoseconds(draft, k)), None)
-    if seconds is None:
-        return column
-    draft.set(time_column=f"{draft.called(seconds)}+{draft.called(seconds + 1)}", time_unit="s")
-    draft.left.pop(seconds, None)
-    draft.left.pop(seconds + 1, None)
-    draft.answer("the unit of the time")
-    return seconds
+    best = max(scores, key=lambda k: (scores[k], 2 * len(set(fit.cells(k))) > len(fit.body), -k), default=None)
+    return best, [k for k in scores if k != best and scores[k] >= 4]
+
+
+def _has_milliseconds(fit: Fit, column: int) -> bool:
+    """Return whether the column after one of times in whole seconds has their milliseconds, which a comma separates."""
+    if fit.separator != "," or fit.types[column] != "time" or column + 1 >= fit.count:
+        return False
+    whole = all(cell.count(":") == 2 and not {".", ","} & {*cell[-4:]} for cell in fit.cells(column))
+    return whole and all(len(cell) == 3 and cell.isdecimal() for cell in fit.cells(column + 1))
 
 
 def _has_nanoseconds(draft: Draft, column: int) -> bool:
@@ -129,8 +203,8 @@ def ask_for_lines_of_one_time(draft: Draft, time: int) -> None:
     begins = [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
     sizes = set(np.diff(begins).tolist())
     if len(begins) > 2 and len(sizes) == 1 and (size := sizes.pop()) > 1 and not draft.table.has_lines:
-        frames: dict[str, Changes] = {"rounded times": {}, "lines of one frame": {"frame_lines": size}}
-        draft.ask(f"{size} lines have the same time", frames)
+        frames = {"rounded times": {"frame_lines": 1}, "lines of one frame": {"frame_lines": size}}
+        draft.ask(f"{size} lines have the same time", "frame_lines frame_end frame_begin", frames)
 
 
 def _rises(fit: Fit, column: int) -> bool:
@@ -149,23 +223,31 @@ def _unnamed_time(draft: Draft) -> int | None:
         return None
     even = [k for k in range(len(names)) if not (k and names[k]) and _rises(fit, k) and _is_even(fit.numbers(k))]
     even = [k for k in even if not names[k] or (len(fit.body) >= _ASCENDS and not column_names.is_counter(names[k]))]
+    even = sorted({*even} - draft.stated_left)
     times = [k for k in even if not fit.counts(k)]
     few = len(fit.body) < _ASCENDS
     if len(times) == len(even) == 1 and not few and not names[times[0]]:
+        draft.be("time", "ascends evenly", times[0])
         draft.said.append(f"column {times[0] + 1} ascends")
         return times[0]
-    if not even or len(even) > 2 or (few and fit.count < 3):
+    if not even or len(even) > 2 or (few and (fit.count < 3 or draft.is_stated("rate_hz"))):
         return None
     column = (times or even)[0]
-    no_time = {"time_column": None, "time_unit": "s", "left": [draft.called(column)]}
-    called = names[column] or column + 1
-    draft.ask(f"column {called} may be the time", {"the time": {}, "not the time, and not a taxel": no_time})
+    choices: dict[str, Changes] = {
+        "the time": {"time_column": draft.called(column)},
+        "not the time, and not a taxel": {"time_column": 0, "left": [draft.called(column)]},
+        "a taxel": {"time_column": 0},
+    }
+    draft.be("time", "ascends", column, certainty=OPEN)
+    draft.ask(f"column {names[column] or column + 1} may be the time", "time_column", choices, first=True)
     return column
 
 
 def _is_even(numbers: NDArray[np.float64]) -> bool:
+    """Return whether a column ascends in like steps but for a few pauses."""
     steps = np.diff(numbers)
-    return bool(np.median(steps) > 0 and steps.max() <= 20 * np.median(steps))
+    usual = np.median(steps)
+    return bool(usual > 0 and (steps > 20 * usual).mean() <= 0.02)
 
 
 def _unit_of_time(draft: Draft, column: int) -> str:
@@ -176,70 +258,83 @@ def _unit_of_time(draft: Draft, column: int) -> str:
     unit, possible = unit_of_times(draft.fit.numbers(column))
     if possible:
         choices = {f"{each}: {hz:.4g} frames/s": {"time_unit": each} for each, hz in possible.items()}
-        draft.ask("the unit of the time", choices)
+        draft.ask("the unit of the time", "time_unit", choices, column)
     return unit
 
 
 def taxels_of(draft: Draft, time: int | None) -> list[int]:
     """Return the columns of readings, and say why the others are none."""
-    fit, names, left, table = draft.fit, draft.names, draft.left, draft.table
-    known = {
-        place
-        for column in (table.time_column, table.label_column)
-        if column is not None
-        for place in places_of(names, "label_column", column)
-    }
+    fit, names, table = draft.fit, draft.names, draft.table
+    known = {k for k, role in enumerate(draft.roles) if role.role == "time"}
+    for key, role in (("label_column", "label"), ("by", "sensor"), ("taxel_column", "taxel's name")):
+        stated = getattr(table, key)
+        places = places_of(names, key, stated) if stated else ()
+        draft.be(role, "stated", *places, certainty=SURE)
+        known |= {*places}
+    if draft.is_stated("leave_out", "keep"):
+        others = {*range(len(names))} - known - draft.stated_left
+        taxels = sorted(k for k in others if table.keeps(names[k]))
+        draft.be("taxel", "stated", *taxels, certainty=SURE)
+        draft.be("no taxel", "stated", *({*range(len(names))} - known - {*taxels}), certainty=SURE)
+        return taxels
     for k in range(len(names)):
-        why = "" if k in known or k in left else next(filter(None, _reasons(draft, k, first=int(time == 0))), "")
+        if k in known or draft.roles[k].is_left:
+            continue
+        role, why = next((each for each in _reasons(draft, k, first=int(time == 0)) if each[1]), ("", ""))
         if why:
-            left[k] = why
-    taxels = [k for k in range(len(names)) if k not in known and k not in left]
+            draft.be(role, why, k)
+    taxels = [k for k in range(len(names)) if k not in known and not draft.roles[k].is_left]
     if not taxels:
         # A sensor may have one taxel, and its name be that of a state.
-        taxels = [k for k in left if fit.types[k] == "number" and left[k].startswith(("labels", "another quantity"))]
-        for k in taxels:
-            del left[k]
+        of_state = ("labels", "another quantity")
+        taxels = [k for k, why in draft.left.items() if fit.types[k] == "number" and why.startswith(of_state)]
+        draft.be("taxel", "", *taxels)
     return _of_one_unit(draft, taxels)
 
 
-def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
-    """Yield why a column is no taxel, by its cells, or by its name; the first that is not "" counts."""
+def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]:
+    """Yield what a column is that is no taxel, and why, by its cells or its name; the first with a reason counts."""
     fit, name = draft.fit, draft.names[column]
     kind, cells = fit.types[column], [cell for cell in fit.cells(column) if cell not in MISSING]
     few, reads = len(set(cells)) <= _KEYS, f"; label_column = {draft.called(column)!r} reads them"
     is_time = time_unit(name) is not None and len(name) > 1
     if kind == "day":
-        yield "a date"
+        yield "no taxel", "a date"
     if kind == "text":
-        other = OTHER[fit.decimal]
+        other, called = OTHER[fit.decimal], draft.called(column)
+        alone = {f"without {called}": {"left": [called]}}
         if cells and all(is_number(cell, other, fit.decimal) for cell in cells):
-            called, marks = draft.called(column), ("points", "commas")
+            marks = ("points", "commas")
             why = f"decimal {marks[other == ',']} in column {called}, {marks[other == '.']} in others"
-            draft.ask(f"{why}; save it with one", {f"without {called}": {}})
-            yield "decimal marks that others have not"
+            draft.ask(f"{why}; save it with one", "leave_out", alone, column)
+            yield "no taxel", "decimal marks that others have not"
         if not is_time and not few and all(map(_GLUED.match, cells)):
-            called = draft.called(column)
-            draft.ask(f"column {called} has numbers with other text, as {cells[0]!r}", {f"without {called}": {}})
+            draft.ask(f"column {called} has numbers with other text, as {cells[0]!r}", "leave_out", alone, column)
         in_turn = 3 * sum(a != b for a, b in pairwise(cells)) > len(cells)
         is_whole = len(cells) == len(fit.body) and not column_names.is_label(name)
         is_key = is_whole and few and (column_names.is_key(name) or (in_turn and len(set(cells)) > 1))
-        yield "times in a form that taxel does not read" * is_time
-        yield _key(draft, column) if is_key else ""
-        yield f"texts{reads * (len(set(cells)) > 1)}"
+        yield "no taxel", "times in a form that taxel does not read" * is_time
+        yield "sensor", _key(draft, column) if is_key else ""
+        yield "label", f"texts{reads * (len(set(cells)) > 1)}"
     if kind == "time" or is_time or (name and fit.ascends(column) and fit.epoch(column)):
-        yield "another time"
+        yield "no taxel", "another time"
     numbers = fit.numbers(column)
     whole = bool((numbers[np.isfinite(numbers)] % 1 == 0).all())
     # A column that counts lines, which no reading does: unnamed among columns with names, or in many lines.
     is_sure = len(fit.body) >= (2 if any(draft.names) and not name else _COUNTS)
     counts = column == first and is_sure and kind == "number" and fit.counts(column)
-    if counts or (column_names.is_counter(name) and whole):
-        yield "a counter"
-    yield f"labels{reads}" * (column_names.is_label(name) and few)
+    # An index may be a finger.
+    few_lines = len(fit.body) < _ASCENDS
+    may_count = few_lines or len(set(cells)) == 1 or bool((np.diff(numbers) > 0).mean() >= 0.2)
+    if counts or (column_names.is_counter(name) and whole and may_count):
+        yield "counter", "a counter"
+    yield "label", f"labels{reads}" * (column_names.is_label(name) and few)
     if column_names.is_key(name) and whole:
         # Lines of one time may be of many taxels.
-        yield _key(draft, column) if few or 2 * len(set(cells)) <= len(cells) else "a counter"
-    yield "another quantity" * column_names.is_other(name, draft.units[column])
+        is_clock = _rises(fit, column) and _is_even(numbers) and not fit.counts(column)
+        repeats = few or 2 * len(set(cells)) <= len(cells)
+        yield "sensor", _key(draft, column) if repeats else "" if is_clock else "a counter"
+    yield "no taxel", "another quantity" * column_names.is_other(name, draft.units[column])
 
 
 def _key(draft: Draft, column: int) -> str:
@@ -250,7 +345,7 @@ def _key(draft: Draft, column: int) -> str:
     if before >= 0 and fit.types[before] == "number" and not draft.names[before]:
         pairs = set(zip(fit.cells(before), fit.cells(column), strict=True))
         if len(pairs) == len(keys) == len(set(fit.cells(before))) > 1:
-            draft.left[before] = "the same as the column that names the sensor"
+            draft.be("no taxel", "the same as the column that names the sensor", before)
     if len(keys) > 1 or draft.key is None:
         draft.key = column
     return f"always {next(iter(keys))}" if len(keys) == 1 else "by"
@@ -264,7 +359,7 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
     fit, called = draft.fit, draft.called
     grid = _grid(draft, taxels)
     keys = [] if draft.key is None and not grid else grid or [draft.key or 0]
-    if not keys:
+    if not keys or draft.is_stated("by", "taxel_column", "leave_out", "keep"):
         return taxels
     values = [k for k in taxels if k not in keys]
     texts = [" ".join(cells) for cells in zip(*map(fit.cells, keys), strict=True)]
@@ -277,7 +372,7 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
     if len(values) == 1 and len(known) > 1 and is_whole and of_taxels:
         sizes = [len(set(fit.cells(k))) for k in keys]
         draft.size = (sizes[0], sizes[1]) if len(keys) > 1 and sizes[0] * sizes[1] == len(known) else None
-        draft.left = {k: why for k, why in draft.left.items() if k not in keys}
+        draft.be("taxel's name", "each time has a reading of each", *keys)
         name = "+".join(str(called(k)) for k in keys)
         draft.set(taxel_column=name if len(keys) > 1 else called(keys[0]))
         draft.said.append(f"a taxel for each {name}")
@@ -289,8 +384,15 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
     if len(taxels) == 1 and times and (len(known) == 1 or pairs > len(set(times))):
         choices[f"a taxel for each: taxel_column = {key!r}"] = {"taxel_column": key, "read": [key]}
     shown = ", ".join(known[:4]) + ", ..." * (len(known) > 4 or len(known) == 1)
-    draft.left[keys[0]] = "by"
-    draft.ask(f"column {key} is {shown} in turn", {**choices, "all lines are of one sensor": {}}, first=True)
+    draft.be("sensor", f"{shown} in turn", keys[0])
+    one: Changes = {"by": 0}
+    draft.ask(
+        f"column {key} is {shown} in turn",
+        "by taxel_column",
+        {**choices, "all lines are of one sensor": one},
+        keys[0],
+        first=True,
+    )
     return taxels
 
 
@@ -302,19 +404,102 @@ def _grid(draft: Draft, taxels: Sequence[int]) -> list[int]:
 
 
 def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
-    """Return the columns in the unit of most, of a force or pressure if there is one; leave out those of others."""
+    """Return the columns in the unit that is stated or of most, of a force or pressure if there is one."""
     units = Counter(draft.units[k] for k in taxels if draft.units[k])
     forces = Counter({unit: count for unit, count in units.items() if column_names.is_force(unit)})
     (unit, count), *others = (forces or units).most_common() or [("", 0)]
+    if draft.layout.unit in units:
+        unit, others = draft.layout.unit or "", []
     if not unit:
         return taxels
     if others and others[0][1] == count:
         other = others[0][0]
         moved, kept = ([draft.called(k) for k in taxels if draft.units[k] == each] for each in (unit, other))
-        choices: dict[str, Changes] = {unit: {}, other: {"unit": other, "left": moved, "read": kept}}
-        draft.ask(f"readings in {unit} or in {other}", choices)
-    draft.left.update({k: f"in {draft.units[k]}" for k in taxels if draft.units[k] not in ("", unit)})
-    return [k for k in taxels if k not in draft.left]
+        choices: dict[str, Changes] = {unit: {"unit": unit}, other: {"unit": other, "left": moved, "read": kept}}
+        draft.ask(f"readings in {unit} or in {other}", "unit", choices, *(k for k in taxels if draft.units[k]))
+    for k in taxels:
+        if draft.units[k] not in ("", unit):
+            draft.be("no taxel", f"in {draft.units[k]}", k)
+    return [k for k in taxels if not draft.roles[k].is_left]
+
+
+def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> list[int]:
+    """Return the columns of readings without those that hold something else by their values; ask of those that may.
+
+    The values are those of the first lines and of some over the whole text. A column of a series, whose names differ in
+    a number, is one as the others are.
+    """
+    stems = [re.sub(r"\d+", "#", name) for name in draft.names]
+    counts = Counter(stems[k] for k in taxels)
+    series = [k for k in taxels if not draft.names[k] or counts[stems[k]] >= _SERIES]
+    alone = [k for k in taxels if draft.fit.types[k] == "number" and k not in {*series}]
+    alone += [k for k in series[-1:] if not draft.names[k]]
+    alone = alone if len(alone) <= _BLOCKS else []
+    are_axes = column_names.axes_of([draft.names[k] for k in taxels]) is not None
+    if draft.is_stated("leave_out", "keep") or len(taxels) < 3 or are_axes or draft.table.has_lines:
+        return taxels
+    fit = draft.fit.over(text.spread) if alone else draft.fit
+    whole = np.column_stack([fit.wide(k) for k in taxels]) if alone else np.empty((0, len(taxels)))
+    usual = np.median([len(set(fit.cells(k))) for k in taxels[:: 1 + len(taxels) // 64]])
+    labels, strays = list[int](), list[int]()
+    for k in alone:
+        at, steps = taxels.index(k), np.diff(fit.numbers(k))
+        numbers = whole[:, at]
+        values, few = set(numbers[np.isfinite(numbers)].tolist()), len(steps) < _COUNTS
+        if not few and time is not None and _rises(fit, k) and _is_even(fit.numbers(k)):
+            _ask_of_two_times(draft, time, k)
+        elif not few and (steps == 1).mean() >= 0.95:
+            draft.be("counter", "counts up by one", k)
+        elif not few and _is_total(numbers, np.delete(whole, at, axis=1)):
+            draft.be("total", "the sum or mean of others", k)
+        elif not few and len(values) == 1:
+            draft.be("taxel", f"always {fit.cells(k)[0]}", k)
+        elif (
+            len(steps) >= _STAYS
+            and len(values) <= _LABELS < usual / 2
+            and all(value % 1 == 0 for value in values)
+            and (steps != 0).mean() <= 1 / 8
+        ):
+            draft.be("label", "few whole values that stay", k, certainty=OPEN)
+            labels.append(k)
+        elif draft.names[k] and len(series) >= _SERIES:
+            draft.be("taxel", "named otherwise than the others", k, certainty=OPEN)
+            strays.append(k)
+    if asked := [*labels, *strays]:
+        called, out = [draft.called(k) for k in labels], [draft.called(k) for k in strays]
+        choices: dict[str, Changes] = {f"leave out {named([*map(str, [*called, *out])])}": {"left": out}}
+        for label in called[:1]:
+            choices[f"{label} has labels"] = {"label_column": label, "read": [label], "left": out}
+        choices["they are taxels too"] = {"read": called}
+        what = ", ".join(f"{draft.called(k)} ({draft.roles[k].why})" for k in asked[:8])
+        draft.ask(f"may be no taxels: {what}", "leave_out keep", choices, *asked)
+    return [k for k in taxels if not draft.roles[k].is_left]
+
+
+def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
+    """Leave out a column that ascends evenly beside the time; where the time repeats, ask which it is."""
+    draft.be("counter" if draft.fit.counts(other) else "no taxel", "ascends evenly, as a time does", other)
+    if 2 * len(set(draft.fit.cells(time))) <= len(draft.fit.body) and not draft.fit.counts(other):
+        old, new = draft.called(time), draft.called(other)
+        choices: dict[str, Changes] = {
+            f"{new} is the time": {"time_column": new, "time_unit": None, "read": [new], "left": [old]},
+            f"{old} is the time": {"time_column": old},
+        }
+        draft.ask(f"column {old} repeats, and {new} ascends evenly", "time_column", choices, time, other)
+
+
+def _is_total(own: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    """Return whether a column is the sum or the mean of others that are side by side; these have shape (lines, n)."""
+    others = others[:, ~np.isnan(others).all(axis=0)]
+    sound = np.isfinite(own) & np.isfinite(others).all(axis=1)
+    own, sums = own[sound, None], np.cumsum(np.pad(others[sound], ((0, 0), (1, 0))), axis=1)
+    near, count = 0.02 * float(own.std()) if len(own) else 0.0, sums.shape[1] - 1
+    for begin in range(count - 1 if count <= _BLOCKS else 1) if near else ():
+        block = sums[:, begin + 2 :] - sums[:, [begin]]
+        sizes = np.arange(2, block.shape[1] + 2)
+        if any(bool((np.abs(each - own).max(axis=0) <= near).any()) for each in (block, block / sizes)):
+            return True
+    return False
 
 
 def are_events(draft: Draft, time: int | None, taxels: Sequence[int]) -> bool:
@@ -323,20 +508,25 @@ def are_events(draft: Draft, time: int | None, taxels: Sequence[int]) -> bool:
     The rate of events says nothing of the unit of their times, as that of frames does: without a name it is asked.
     """
     fit, units = draft.fit, ("us", "ms", "s")
+    choices: dict[str, Changes]
     called = {EVENT_COLUMNS.get(name, name): k for k in taxels for name in [draft.names[k].lower()]}
     named = [called[name] for name in "xyp" if name in called]
     if time is not None and len(taxels) == len(named) == 3 and _are_places(fit, named):
         draft.set(events=True)
-        draft.answer("the unit of the time")
-        if not (time_unit(draft.names[time]) or fit.types[time] == "time" or fit.epoch(time)):
+        draft.answer("time_unit")
+        if not draft.is_stated("time_unit") and not (
+            time_unit(draft.names[time]) or fit.types[time] == "time" or fit.epoch(time)
+        ):
             likely = units[:2] if bool((fit.numbers(time) % 1 == 0).all()) else units[:0:-1]
-            draft.ask("the unit of the time of the events", {unit: {"time_unit": unit} for unit in likely})
+            choices = {unit: {"time_unit": unit} for unit in likely}
+            draft.ask("the unit of the time of the events", "time_unit", choices, time)
         return True
     for order in ("txyp", "xypt") if fit.count == 4 and not any(draft.names) else ():
         ascends = bool((np.diff(fit.numbers(order.index("t"))) >= 0).all())
         if ascends and _are_places(fit, [order.index(name) for name in "xyp"], polarities=2):
             events = {"columns": list(order), "time_column": "t", "time_unit": "us", "leave_out": [], "events": True}
-            draft.ask("frames or events", {"frames of taxels": {}, "events, in us": events}, first=True)
+            choices = {"frames of taxels": {"events": False}, "events, in us": events}
+            draft.ask("frames or events", "events", choices, first=True)
             break
     return False
 
@@ -350,26 +540,27 @@ def _are_places(fit: Fit, columns: Sequence[int], polarities: int = 1) -> bool:
 
 
 def said_of(draft: Draft, time: int | None) -> Iterator[str]:
-    """Yield how lines and columns were read, and which columns were left out and why."""
+    """Yield how lines and columns were read, and which columns were left out and why; only this of a stated table."""
     table = draft.table
     marks = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks", "|": "bars"}
     kinds = {"marked": "marks and names between cells", "json": "lines of JSON", "hex": "hexadecimal"}
-    yield kinds.get(table.lines, f"separated by {marks.get(table.separator, table.separator)}")
-    if table.decimal == ",":
-        yield "decimal commas"
-    if table.thousands is not None:
-        yield f"thousands by {table.thousands!r}"
-    if time is not None:
-        yield f"time {table.time_column!r} in {table.time_unit}"
-    else:
-        yield "no times" if table.frame_time is None else f"time in {table.frame_time} above each frame"
-    if table.label_column is not None:
-        yield f"labels {table.label_column!r}"
-    used = [draft.units[k] for k in range(len(draft.units)) if k not in draft.left and k != time]
-    yield from (f"unit {unit}" for unit in sorted(filter(None, used))[:1])
+    if draft.layout.table is None:
+        yield kinds.get(table.lines, f"separated by {marks.get(table.separator, table.separator)}")
+        if table.decimal == ",":
+            yield "decimal commas"
+        if table.thousands is not None:
+            yield f"thousands by {table.thousands!r}"
+        if time is not None:
+            yield f"time {table.time_column!r} in {table.time_unit}"
+        else:
+            yield "no times" if table.frame_time is None else f"time in {table.frame_time} above each frame"
+        if table.label_column is not None:
+            yield f"labels {table.label_column!r}"
+        used = [role.unit for role in draft.roles if role.role == "taxel"]
+        yield from (f"unit {unit}" for unit in sorted(filter(None, used))[:1])
     reasons: dict[str, list[str]] = {}
-    for k, why in sorted(draft.left.items()):
-        reasons.setdefault(why, []).append(draft.names[k] or f"column {k + 1}")
+    for role in draft.roles:
+        if role.certainty == LIKELY and role.role != "time" and role.why:
+            reasons.setdefault(f"{role.why}" if role.role == "taxel" else f"left out: {role.why}", []).append(role.name)
     for why, names in reasons.items():
-        shown = ", ".join(islice(names, 8)) + ", ..." * (len(names) > 8)
-        yield f"{shown} left out: {why}"
+        yield f"{named(names)} {why}"

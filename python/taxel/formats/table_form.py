@@ -8,29 +8,28 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
-from typing import NoReturn
+from dataclasses import replace
 
 import numpy as np
 
-from taxel._base.arguments import shown
-from taxel._base.errors import unreadable
+from taxel._base.errors import placed, unreadable
 from taxel._base.limits import COLUMNS
 from taxel._base.messages import counted, first_line
 from taxel._base.table_text import Text
-from taxel._core import ProblemError
+from taxel._core import FormatError, ProblemError
 from taxel.formats import column_names
-from taxel.formats.form import Form
+from taxel.formats.form import Form, places_of
 from taxel.formats.layout import Layout, Table
-from taxel.formats.layout_text import refuse_to_choose
-from taxel.formats.line_fits import FITS, THOUSAND, Fit, fits_in, fits_of
+from taxel.formats.layout_text import refuse_open
+from taxel.formats.line_fits import FITS, THOUSAND, Fit, fits_in
 from taxel.formats.lines import OTHER, is_number, number_of, read_line
+from taxel.formats.roles import SURE, Changes
 from taxel.formats.table_columns import (
-    Changes,
     Draft,
     are_events,
     ask_for_lines_of_one_time,
     by_key,
+    by_values,
     said_of,
     taxels_of,
     time_of,
@@ -39,6 +38,8 @@ from taxel.formats.times import FEW_ODD, ODD, unit_of_times
 
 #: Two readings fit about equally if one fits this share of the other.
 _EQUALLY = 0.999
+#: What another reading of lines does not leave out.
+_NOTHING_FOUND: Changes = {"time_column": None, "leave_out": []}
 #: A line above a frame: a word and the frame's number, or its time, or both.
 _ABOVE_FRAME = re.compile(
     r"\s*(?P<word>[^\W\d_]+)[ \t:=#.]*(?P<number>\d+(?:[.,]\d+)?)[ \t]*(?P<unit>[mun]?s)?"
@@ -46,6 +47,8 @@ _ABOVE_FRAME = re.compile(
     re.IGNORECASE,
 )
 _ONE_DOCUMENT = "is one document of JSON; save a line of JSON per frame, or a .csv"
+#: An array as NumPy prints it that has more values than it prints.
+_CUT = re.compile(r"\d\.?[\s,]+\.\.\.[\s,]+[-+.\d]")
 _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 #: The mark of a comment before names.
 _COMMENT = re.compile(r"(?:#+|(?:[%;!*]|//)+(?=\s|$))\s*")
@@ -72,47 +75,17 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     FormatError : no table of numbers, one that the layout does not fit, or two readings that fit about equally (prints
         the layout of each)
     """
+    if label_column is not None:
+        layout = replace(layout, table=replace(layout.table or Table(), label_column=label_column))
     try:
-        if layout.table is None:
-            form, full = _as_it_looks(text, layout, label_column)
-        else:
-            how = layout.table if label_column is None else replace(layout.table, label_column=label_column)
-            form, full = _stated(text, how), replace(layout, table=how)
+        form, full = _found(text, layout)
         if not form.taxels:
             raise unreadable("the layout leaves no column that is a taxel", text.path)
+    except FormatError as error:
+        raise placed(error, text.path) from None
     except ProblemError as error:
         raise unreadable(first_line(error), text.path) from None
     return form, full
-
-
-def _stated(text: Text, how: Table) -> Form:
-    """Return the form of a table that a layout describes."""
-    shown_lines = ["" if k < how.skip_lines or how.is_between(line) else line for k, line in enumerate(text.head)]
-    missing = () if how.missing is None else (how.missing,)
-    stated = [(how.lines, how.separator, how.decimal)]
-    fit = next(fits_of(shown_lines, stated, missing, thousands=how.thousands), None)
-    line = how.skip_lines + 1
-    if fit is None:
-        why = f"no line of numbers between separators {how.separator!r}; write what is right in [table] of the layout"
-        raise unreadable(why, text.path, line=line if any(shown_lines) else None)
-    draft = draft_of(fit, shown_lines)
-    names = tuple(how.columns) or draft.names
-    if fit.count > COLUMNS:
-        raise unreadable(f"{fit.count} columns; must have at most {COLUMNS}", text.path, line=line)
-    if how.columns and not len(draft.names) <= len(names) <= fit.count:
-        wrong = f"{counted(len(names), 'name')} for {counted(len(draft.names), 'column')}"
-        raise unreadable(wrong, text.path, line=line)
-    form = Form(how, names, fit.first, own=_own(how, names))
-    is_timed = how.time_column is not None
-    timed = next((k for k in form.taxels if not is_timed and column_names.is_time(names[k])), None)
-    if timed is not None and (timed == 0 or len(names[timed]) > 1) and how.frame_time is None:
-        raise unreadable(
-            f"column {shown(names[timed])} contains times, as its name shows; write time_column, or leave_out, in "
-            "[table] of the layout file",
-            text.path,
-            line=fit.first,
-        )
-    return form
 
 
 def _own(how: Table, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -120,36 +93,31 @@ def _own(how: Table, names: tuple[str, ...]) -> tuple[str, ...]:
     return names if how.lines in ("marked", "json") and not how.columns and any(names) else ()
 
 
-def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> tuple[Form, Layout]:
-    """Return the form of a table that fits its first lines best, and the layout that states it."""
-    lines = text.head
+def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
+    """Return the form of a table as the layout states it, and else as it fits its lines best; and the whole layout."""
+    lines, stated = text.head, layout.table or Table()
     if text.path.suffix.lower() == ".json" and not any(read_line(line, "json") for line in lines[:3]):
         raise unreadable(_ONE_DOCUMENT, text.path)
-    begin, units = _begin_of_frames(lines)
+    begin, units = (
+        (stated.frame_begin or "", [stated.frame_time or ""]) if stated.has_lines else _begin_of_frames(lines)
+    )
     is_begin = [bool(begin) and line.lstrip().startswith(begin) for line in lines]
-    shown_lines = ["" if above else line for line, above in zip(lines, is_begin, strict=True)]
-    size = (layout.rows or 0) * (layout.columns or 0)
-    found, may_be_hex = fits_in(shown_lines, text.lines)
-    fits = [fit for fit in found if fit.purity >= FITS]
-    fits.sort(key=lambda fit: (-fit.score, bool(size) and fit.count != size))
-    if not fits:
-        why = "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)"
-        raise unreadable(why, text.path)
-    if fits[0].kind == "json" and len(fits[0].lines) == 1:
-        raise unreadable(_ONE_DOCUMENT, text.path)
-    _refuse_lines_above(text, fits[0])
-    draft = draft_of(fits[0], shown_lines)
-    other = next((fit for fit in fits[1:] if _fits_as_well(fit, fits[0], size)), None)
-    if other is not None:
-        draft = _decided(draft, draft_of(other, shown_lines))
-    if may_be_hex:
-        draft.ask("decimal or hexadecimal numbers", {"decimal numbers": {}, "hexadecimal numbers": {"lines": "hex"}})
-    _frames(draft, lines, is_begin, begin, units)
-    stated = layout.rows is not None or layout.rate_hz is not None or layout.path != text.path
-    draft.set(label_column=label_column)
-    time = time_of(draft, is_stated=stated)
+    above = is_begin.index(True) if any(is_begin) else 0
+    is_above = [
+        is_first or k < stated.skip_lines or (k < above and any(map(str.isdigit, line)))
+        for k, (is_first, line) in enumerate(zip(is_begin, lines, strict=True))
+    ]
+    shown_lines = ["" if above else line for line, above in zip(lines, is_above, strict=True)]
+    cut = next((k for k, line in enumerate(lines) if "..." in line and _CUT.search(line)), None)
+    if cut is not None:
+        right = "save them whole, as numpy.set_printoptions(threshold=sys.maxsize) prints them"
+        raise unreadable(f"an array is cut by ..., and its values are lost; {right}", text.path, line=cut + 1)
+    draft = _draft(text, layout, shown_lines)
+    _frames(draft, lines, is_begin, begin, [unit for unit in units if unit])
+    time = time_of(draft)
     _ask_of_thousands(draft, time)
-    if time is None and draft.table.frame_time is None and not stated:
+    is_laid_out = layout.rows is not None or layout.rate_hz is not None
+    if time is None and draft.table.frame_time is None and not is_laid_out:
         _without_times(draft, text)
     taxels = taxels_of(draft, time)
     if not taxels:
@@ -157,14 +125,56 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
     taxels = by_key(draft, time, taxels, text.lines)
     if time is not None and draft.table.taxel_column is None:
         ask_for_lines_of_one_time(draft, time)
-    draft.set(leave_out=[draft.called(k) for k in sorted(draft.left)])
     are = are_events(draft, time, taxels)
+    if not are and draft.table.taxel_column is None:
+        taxels = by_values(draft, time, taxels, text)
+    if not draft.is_stated("leave_out", "keep"):
+        left = (k for k, role in enumerate(draft.roles) if role.is_left and role.certainty != SURE)
+        of_taxel = places_of(draft.names, "", draft.table.taxel_column) if draft.table.taxel_column else ()
+        draft.set(leave_out=[draft.called(k) for k in left if k not in of_taxel])
     full = replace(layout, table=draft.table)
     full = full if are else _with_size(full, draft, taxels)
-    if draft.asked and not (stated and draft.asked[0][0].startswith("the first line")):
-        _refuse(text, full, draft)
+    unread = [draft.called(k) for k, why in draft.left.items() if why.startswith("times in")]
+    if unread and time is None and draft.table.frame_time is None:
+        right = "write them as 2024-05-01T10:00:00.25, or state rate_hz and leave_out in a layout file"
+        raise unreadable(f"column {unread[0]} has times in a form that taxel does not read; {right}", text.path)
+    refuse_open(text.path, "can be read in", full, draft.roles, draft.questions)
     how = full.table or draft.table
-    return Form(how, draft.names, draft.fit.first, (*said_of(draft, time), *draft.said), _own(how, draft.names)), full
+    said = (*said_of(draft, time), *draft.said)
+    return Form(how, draft.names, draft.fit.first, said, _own(how, draft.names), roles=draft.roles), full
+
+
+def _draft(text: Text, layout: Layout, lines: Sequence[str]) -> Draft:
+    """Return how lines are cells and what they are called, as the layout states it or as fits best."""
+    stated = layout.table or Table()
+    size = (layout.rows or 0) * (layout.columns or 0)
+    found, may_be_hex = fits_in(lines, text.lines, stated=layout)
+    is_stated = not layout.stated.isdisjoint(("separator", "lines", "skip_lines"))
+    fits = [fit for fit in found if is_stated or fit.purity >= FITS]
+    fits.sort(key=lambda fit: (-fit.score, bool(size) and fit.count != size))
+    if not fits and is_stated:
+        why = (
+            f"no line of numbers between separators {stated.separator!r}; write what is right in [table] of the layout"
+        )
+        raise unreadable(why, text.path, line=stated.skip_lines + 1 if any(lines) else None)
+    if not fits:
+        why = "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)"
+        raise unreadable(why, text.path)
+    if fits[0].kind == "json" and len(fits[0].lines) == 1 and not is_stated:
+        raise unreadable(_ONE_DOCUMENT, text.path)
+    if not is_stated:
+        _refuse_lines_above(text, fits[0])
+    draft = draft_of(fits[0], lines, layout)
+    other = next((fit for fit in fits[1:] if _fits_as_well(fit, fits[0], size)), None)
+    if other is not None and not draft.is_stated("separator"):
+        draft = _decided(draft, draft_of(other, lines, layout))
+    if may_be_hex:
+        kinds = {"decimal numbers": {"lines": "plain"}, "hexadecimal numbers": {"lines": "hex"}}
+        draft.ask("decimal or hexadecimal numbers", "lines", kinds)
+    if draft.fit.count > COLUMNS:
+        why = f"{draft.fit.count} columns; must have at most {COLUMNS}"
+        raise unreadable(why, text.path, line=stated.skip_lines + 1)
+    return draft
 
 
 def _refuse_lines_above(text: Text, fit: Fit) -> None:
@@ -193,16 +203,39 @@ def _decided(draft: Draft, other: Draft) -> Draft:
         return other
     first, second = (counted(each.fit.count, "column") for each in (draft, other))
     keys = ("separator", "decimal", "thousands", "skip_lines", "lines")
-    changes = {key: getattr(other.table, key) for key in keys} | {"time_column": None, "leave_out": []}
-    draft.ask(f"{first} or {second}", {first: {}, second: changes})
+    ways = {name: {key: getattr(each.table, key) for key in keys} for name, each in ((first, draft), (second, other))}
+    draft.ask(f"{first} or {second}", "separator", {first: ways[first], second: {**ways[second], **_NOTHING_FOUND}})
     return draft
 
 
-def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
+def draft_of(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
+    """Return the names of a table, as they are stated or as they are above it, and how its lines are read.
+
+    Raises
+    ------
+    FormatError : another number of names is stated
+    """
+    draft = _called(fit, lines, layout)
+    stated = layout.table or Table()
+    if not stated.columns:
+        return draft if not draft.is_stated("skip_lines") else replace(draft, table=_skipping(draft, stated.skip_lines))
+    names = tuple(map(str, stated.columns))
+    if not len(draft.names) <= len(names) <= fit.count:
+        here = f"{counted(len(names), 'name')} for {counted(len(draft.names), 'column')}"
+        raise unreadable(here, line=stated.skip_lines + 1)
+    units = tuple(map(column_names.unit_of, names))
+    return replace(draft, table=_skipping(draft, stated.skip_lines), names=names, units=units)
+
+
+def _skipping(draft: Draft, count: int) -> Table:
+    return replace(draft.table, skip_lines=count)
+
+
+def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
     """Return the names above a table, and how its lines are read."""
     above = [(k, list(line.cells)) for k, line in fit.lines[: fit.body[0]] if not _is_rule(line.cells)]
-    keys = ("separator", "decimal", "thousands")
-    table = Table(**{key: getattr(fit, key) for key in keys}, lines=fit.kind, skip_lines=fit.first)
+    keys = {key: getattr(fit, key) for key in ("separator", "decimal", "thousands")}
+    table = replace(layout.table or Table(), **keys, lines=fit.kind, skip_lines=fit.first)
     if fit.kind != "plain":
         table = replace(table, separator=fit.separator if fit.kind == "hex" else ",")
         own = fit.lines[fit.body[0]][1].names
@@ -211,12 +244,12 @@ def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
         names = own if any(own) else _names_above_marks(fit, lines)
         if not any(own) and any(names):
             table = replace(table, columns=list(names))
-        return Draft(fit, table, names, tuple(map(column_names.unit_of, names)))
+        return Draft(fit, table, names, tuple(map(column_names.unit_of, names)), layout)
     real = fit.count
     while real > 1 and fit.types[real - 1] == "empty":
         real -= 1
     head = [(k, row) for k, cells in above[-3:] if (row := _names_in(cells, fit.count, real))]
-    unnamed = Draft(fit, table, ("",) * real, ("",) * real)
+    unnamed = Draft(fit, table, ("",) * real, ("",) * real, layout)
     if not head or head[-1][0] < above[-1][0]:
         return _numbered(unnamed)
     has_units = len(head) > 1 and column_names.are_units(head[-2][1], head[-1][1])
@@ -228,9 +261,10 @@ def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
     named = [name for name in names if name]
     if len(set(named)) < len(named) and len(head) > 1 and any(head[-2][1]):
         names = tuple(_below(head[-2][1], names))
-        return Draft(fit, replace(table, columns=list(names)), names, tuple(map(column_names.unit_of, names)))
+        units = tuple(map(column_names.unit_of, names))
+        return Draft(fit, replace(table, columns=list(names)), names, units, layout)
     stripped = tuple(unit.strip("[]()") for unit in units[: len(names)]) or tuple(map(column_names.unit_of, names))
-    return Draft(fit, replace(table, skip_lines=at_names), names, stripped)
+    return Draft(fit, replace(table, skip_lines=at_names), names, stripped, layout)
 
 
 def _ask_of_thousands(draft: Draft, time: int | None) -> None:
@@ -249,14 +283,17 @@ def _ask_of_thousands(draft: Draft, time: int | None) -> None:
     is_usual = fit.separator == ";" if mark == "," else fit.separator != ";"
     example = next(filter(None, marked))[0]
     if fit.thousands is not None and not have_both:
-        draft.ask(f"{example} may be a thousand", {f"thousands by {mark!r}": {}})
+        choices = {f"thousands by {mark!r}": {"decimal": fit.decimal, "thousands": mark}}
+        draft.ask(f"{example} may be a thousand", "decimal thousands", choices)
     elif fit.thousands is None and (have_both or not is_usual):
         changes = {"decimal": other, "thousands": mark}
         if time is not None and fit.types[time] == "number" and column_names.time_unit(draft.names[time]) == "":
             numbers = replace(fit, decimal=other, thousands=mark).numbers(time)
             changes["time_unit"] = unit_of_times(numbers)[0]
         why = f"{example} has decimals, or is a thousand"
-        draft.ask(why, {f"decimals by {mark!r}": {}, f"thousands by {mark!r}": changes}, first=True)
+        decimals = {"decimal": fit.decimal}
+        choices = {f"decimals by {mark!r}": decimals, f"thousands by {mark!r}": changes}
+        draft.ask(why, "decimal thousands", choices, first=True)
 
 
 def _is_rule(cells: Sequence[str]) -> bool:
@@ -296,7 +333,9 @@ def _numbered(draft: Draft) -> Draft:
     if not cells[0] and len(first) == fit.count - 1 and fit.types[0] == "number":
         return replace(draft, fit=replace(fit, body=fit.body[1:]), table=replace(draft.table, skip_lines=below))
     if len(first) == fit.count >= 4:
-        draft.ask("the first line is 1, 2, 3 ...", {"a frame": {}, "numbers of columns": {"skip_lines": below}})
+        first_frame = fit.lines[fit.body[0]][0]
+        choices = {"a frame": {"skip_lines": first_frame}, "numbers of columns": {"skip_lines": below}}
+        draft.ask("the first line is 1, 2, 3 ...", "skip_lines rows", choices)
     return draft
 
 
@@ -356,12 +395,14 @@ def lines_between_blanks(fit: Fit, lines: Sequence[str], *, from_begin: bool) ->
 
 def _frames(draft: Draft, lines: Sequence[str], is_begin: Sequence[bool], begin: str, units: Sequence[str]) -> None:
     """Say how many lines a frame has: those between lines of text, or between empty lines."""
+    if draft.is_stated("frame_lines", "frame_end", "frame_begin"):
+        return
     if begin:
         first = min(is_begin.index(True), draft.fit.first)
         draft.set(frame_begin=begin, frame_time=next(iter(units), None), skip_lines=first)
         draft.said.append(f"frames begin at lines {begin!r}")
         if len(units) > 1:
-            draft.ask("the unit of the time", {f"{unit}": {"frame_time": unit} for unit in units})
+            draft.ask("the unit of the time", "frame_time", {unit: {"frame_time": unit} for unit in units})
     elif (size := lines_between_blanks(draft.fit, lines, from_begin=True)) > 1:
         draft.set(frame_end="blank")
         draft.said.append(f"{size} lines per frame, between empty lines")
@@ -369,14 +410,15 @@ def _frames(draft: Draft, lines: Sequence[str], is_begin: Sequence[bool], begin:
 
 def _without_times(draft: Draft, text: Text) -> None:
     """Ask what lines without times are: frames one after the other, or the rows of one frame."""
-    fit = draft.fit
-    odd = len(fit.lines) - len(fit.body)
-    count = sum(1 for line in text.lines() if line.strip(" \t\r,;")) - odd
-    if draft.table.has_lines or count < 2:
-        draft.ask("it has no times", {"frames without times": {}})
+    keys, count = "time_column frame_lines", len(draft.fit.body)
+    if draft.table.has_lines or count < 2 or text.goes_on:
+        draft.ask("it has no times", keys, {"frames without times": {"time_column": 0}})
         return
-    together = {f"rows of one frame: frame_lines = {count}": {"frame_lines": count, "frame_end": None}}
-    draft.ask(f"{counted(count, 'line')}, no times", {"a frame per line, without times": {}, **together})
+    choices: dict[str, Changes] = {
+        "a frame per line, without times": {"frame_lines": 1},
+        f"rows of one frame: frame_lines = {count}": {"frame_lines": count, "frame_end": None},
+    }
+    draft.ask(f"{counted(count, 'line')}, no times", keys, choices)
 
 
 def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
@@ -391,7 +433,7 @@ def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
                 'axis = "all": each axis a source': {"axis": "all"},
                 'axis = "shear": the length of x and y': {"axis": "shear"},
             }
-            draft.ask("taxels with the axes x, y and z", choices)
+            draft.ask("taxels with the axes x, y and z", "axis", choices, *taxels)
         return full
     places = draft.size or (column_names.places_of(names) if any(names) and not layout.rows else None)
     if places is not None and min(places) > 1:
@@ -401,25 +443,3 @@ def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
     if is_part and size > len(taxels) and size % len(taxels) == 0 and not draft.table.has_lines:
         full = replace(full, table=replace(draft.table, frame_lines=size // len(taxels)))
     return full
-
-
-def _refuse(text: Text, layout: Layout, draft: Draft) -> NoReturn:
-    """Refuse a table that can be read in two ways, with the layout of each."""
-    unread = [draft.called(k) for k, why in draft.left.items() if why.startswith("times in")]
-    if unread and draft.table.time_column is None:
-        right = "write them as 2024-05-01T10:00:00.25, or state rate_hz and leave_out in a layout file"
-        raise unreadable(f"column {unread[0]} has times in a form that taxel does not read; {right}", text.path)
-    why, choices = draft.asked[0]
-    also = "".join(f"; also open: {other}" for other, _ in draft.asked[1:])
-    ways = f"can be read in {len(choices)} ways ({why})" if len(choices) > 1 else why
-    refuse_to_choose(text.path, f"{ways}{also}", {name: _changed(layout, each) for name, each in choices.items()})
-
-
-def _changed(layout: Layout, changes: Changes) -> Layout:
-    """Return a layout with other keys, of its own or of its table."""
-    table = layout.table or Table()
-    known = {each.name for each in fields(Table)}
-    left = [column for column in table.leave_out if column not in changes.get("read", ())]
-    of_table = {"leave_out": [*left, *changes.get("left", ())], **{k: v for k, v in changes.items() if k in known}}
-    own = {key: value for key, value in changes.items() if key not in (*known, "left", "read")}
-    return replace(layout, table=replace(table, **of_table), **own)

@@ -27,7 +27,9 @@ _USUAL_HZ, _POSSIBLE_HZ = (5.0, 500.0), (0.5, 20_000.0)
 _EPOCH = (1e9, 3e9)
 #: Times in units of these, us: those in which they may be found to be, and others that a name states.
 FOUND_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
-UNITS_US = {**FOUND_US, "min": 60e6, "h": 3600e6}
+UNITS_US = {**FOUND_US, "min": 60e6, "h": 3600e6, "d": 86_400e6}
+#: Days of which a time of today has so many, and day 0 of which is 1970: those of spreadsheets and of MATLAB.
+_DAYS = {25_569: (3e4, 6.6e4), 719_529: (7.2e5, 7.7e5)}
 #: The unit of times that are texts: dates with times, or times of a day.
 ISO = "iso"
 
@@ -59,6 +61,8 @@ _SHORTEST_DATE = 8
 _WRAPS = (1 << 16, 1 << 32)
 #: A step over a wrap, or to a line out of order, is at most so many usual ones.
 _NEAR = 64
+#: So many times are not all the same.
+_MANY = 20
 #: So many lines one after the other that are earlier than the line before them begin the times again.
 _AGAIN = 3
 
@@ -136,8 +140,16 @@ def seconds_of(cell: str) -> float:
 
 def epoch_of(numbers: NDArray[np.float64]) -> str:
     """Return the unit in which numbers are times since 1970; "" if none."""
+    steps = np.diff(numbers)
+    if _day_0(numbers) and len(steps) and steps.max() < 0.01:
+        return "d"
     first, last = (1e6 * edge for edge in _EPOCH)
     return next((u for u, us in FOUND_US.items() if ((numbers * us > first) & (numbers * us < last)).all()), "")
+
+
+def _day_0(days: NDArray[np.float64]) -> int:
+    """Return the day of 1970 where days are those of a spreadsheet or of MATLAB; else 0."""
+    return next((day for day, (least, most) in _DAYS.items() if ((days > least) & (days < most)).all()), 0)
 
 
 def unit_of_times(times: NDArray[np.float64]) -> tuple[str, dict[str, float]]:
@@ -177,7 +189,8 @@ def us_of(column: Any, unit: str) -> NDArray[Any]:
     if values.dtype.kind in "iu" and unit in ("us", "ns"):
         exact: NDArray[np.int64] = values.astype(np.int64)
         return exact if unit == "us" else (exact + 500) // 1000
-    times = pd.to_numeric(column, errors="coerce").to_numpy(np.float64) * UNITS_US[unit]
+    times = pd.to_numeric(column, errors="coerce").to_numpy(np.float64)
+    times = (times - (_day_0(times) if unit == "d" and len(times) else 0)) * UNITS_US[unit]
     sound = np.abs(times) <= TIME_US
     return np.rint(times).astype(np.int64) if sound.all() else np.where(sound, np.rint(times), np.nan)
 
@@ -269,6 +282,14 @@ def in_order(
     FormatError : a time is missing or farther from 0 than 142 years, or many are out of order
     """
     us = us_of(column, unit)
+    different = np.unique(us[:: 1 + len(us) // 1000])
+    least, most = (1e6 / hz for hz in reversed(_POSSIBLE_HZ))
+    few, is_rate = len(different) < _AGAIN, len(different) > 1 and least < np.ptp(us) * 2 / len(us) < most
+    if len(us) >= _MANY and few and not is_rate:
+        right = "save all their digits, or write time_column = 0 and rate_hz in a layout file"
+        raise unreadable(
+            f"{noun}: only {len(different)} different of {len(us)}, as where digits are lost; {right}", path
+        )
     if us.dtype.kind == "f":
         bad = int(np.flatnonzero(np.isnan(us))[0])
         right = "must be like 2024-05-01T10:00:00.25" if unit == ISO else "must be within 142 years of 0"
@@ -327,7 +348,9 @@ def _spread(t: NDArray[np.int64], usual: int) -> NDArray[np.int64]:
     counts = np.diff(begins, append=len(t))
     nexts = np.append(t[begins[1:]], t[-1] + round(usual * counts[-1] / float(np.median(counts))))
     within = np.arange(len(t)) - np.repeat(begins, counts)
-    gaps = np.repeat((nexts - t[begins]) / counts, counts)
+    # A pause after a time that repeats is none between its lines.
+    own = (nexts - t[begins]) / counts
+    gaps = np.repeat(np.minimum(own, np.median(own)), counts)
     spread = t + np.floor(within * gaps).astype(np.int64)
     # Fewer us than lines between two times.
     steps = np.arange(len(t))

@@ -26,6 +26,7 @@ from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
 from taxel.formats.foreign import refuse_container
 from taxel.formats.layout import Layout, advice
+from taxel.formats.parts import parts_of
 from taxel.formats.ros import is_bag, read_ros
 from taxel.formats.table import ENDINGS as TABLES
 from taxel.formats.table import read_table
@@ -262,7 +263,9 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
         case "csv":
             check_head(path)
         case "table":
-            form_of(Text(path), found or Layout(path))
+            how = found or Layout(path)
+            for text in parts_of(Text(path), how.table)[0].values():
+                form_of(text, how)
         case "arrays":
             look(path, found or Layout(path))
 

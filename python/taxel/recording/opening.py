@@ -17,6 +17,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.formats.checks import check_table
 from taxel.formats.event_camera import Reduction, reduced
+from taxel.formats.foreign import refuse_container
 from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
 from taxel.labels import Labels, trial_of
@@ -109,6 +110,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     """
     file = Path(arguments.checked_path("path", path))
     if is_folder(file):
+        refuse_container(file)
         raise ProblemError(
             f"{file}: is a folder; name one of its recordings (in Python, taxel.open_all opens all of them)"
         )
@@ -175,6 +177,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
 def _open(path: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file, with the labels of the tables beside them."""
     if is_folder(path):
+        refuse_container(path)
         return _open_folder(path, options)
     opened = _open_file(path, options, layout_of(path, options.layout))
     return [labels_for(each, name) for name, each in _named(opened, Path(path.name))]

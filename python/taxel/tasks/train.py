@@ -38,6 +38,8 @@ from taxel.tasks.train_result import Training
 
 #: Sensors of more taxels are no columns of a table.
 _CHANNELS = 256
+#: By so much labels may be off the changes of a column that they are of, us.
+_LATE_US = 200_000
 #: So many lines say what was measured of labels and sensor.
 _LINES = 4
 
@@ -107,7 +109,7 @@ def _train(
 ) -> Training:
     opened = labelled_trials(labels, recordings)
     labelled, unlabelled = given_labels(labels, opened, shift_ms=options.shift_ms)
-    _check(opened, labelled)
+    _check(opened, labelled, update)
     some = [k for k, each in enumerate(opened) if each.label not in unlabelled]
     opened, labelled = [opened[k] for k in some], [labelled[k] for k in some]
     names = sorted({label for events in labelled for label in events})
@@ -164,7 +166,7 @@ def _train(
     return replace(training, unlabelled=unlabelled, constants_ms=constants)
 
 
-def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]]) -> None:
+def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]], update: Progress) -> None:
     """Refuse events without intensities; warn of a channel that is one of labels, and of trials that begin loaded."""
     for each, events in zip(opened, labelled, strict=True):
         table = recorded(each)
@@ -176,7 +178,9 @@ def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[
         like = _like_labels(table, events)
         if len(like) == 1:
             right = "if it holds labels, not readings, leave it out (leave_out in a layout file)"
-            warn(f"{each.name}: {like[0]} alone changes with the labels and hardly else; {right}")
+            line = f"{each.name}: {like[0]} alone changes with the labels and hardly else; {right}"
+            warn(line)
+            update(Announcement(line), 0, 0)
     begun = sum(_begins_with_label(recorded(each), events) for each, events in zip(opened, labelled, strict=True))
     if 2 * begun > len(opened):
         warn(
@@ -224,7 +228,15 @@ def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]
     step = float(np.median(np.diff(table.t)))
     names = table.array.names or [f"channel {k + 1}" for k in range(changes.shape[1])]
     at = {k: table.t[1:][changes[:, k]] for k in few.tolist()}
-    return [names[k] for k, own in at.items() if np.abs(own[:, None] - t).min(axis=0).max() <= 1.5 * step]
+    found = list[str]()
+    for k, own in at.items():
+        late = own[:, None] - t
+        late = late[np.abs(late).argmin(axis=0), np.arange(len(t))]
+        usual = float(np.median(late))
+        # Labels may be later than the column by one constant.
+        if abs(usual) <= _LATE_US and np.abs(late - usual).max() <= 1.5 * step:
+            found.append(names[k])
+    return found
 
 
 def _examples(

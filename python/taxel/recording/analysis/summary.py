@@ -18,6 +18,8 @@ from taxel.recording.recording import Recording
 _PEAK_US = 10_000
 #: At most so many places of taxels are listed that were not touched enough: a large sensor may have millions.
 _PLACES = 100
+#: Kinds of files that do not state the sensor of their events.
+_WITHOUT_SIZE = ("csv", "lsa", "records", "table")
 
 
 def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
@@ -29,7 +31,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     pressed : Series, optional
         Its pressure over time (`taxel.recording.analysis.pressure.series`), if it has intensities.
     """
-    array = recording.array
+    array, stated = recording.array, recording._main.facts.layout
     table: Events | Frames = recording.events if recording.has_events else recording.frames()
     span = (int(table.t.min()), int(table.t.max())) if len(table) and recording.timed else None
     seconds = (span[1] - span[0]) / 1e6 if span else 0.0
@@ -40,7 +42,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},
         "side": recording.side,
         "heel": recording.heel,
-        "array_assumed": recording.kind in ("csv", "lsa", "records") and recording.has_events,
+        "array_assumed": recording.kind in _WITHOUT_SIZE and recording.has_events and not stated.startswith("rows"),
         "timed": recording.timed,
         "from_us": span[0] if span else None,
         "to_us": span[1] if span else None,
@@ -97,7 +99,8 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict": recording.verdict,
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
-        "layout": recording._main.facts.layout,
+        "layout": stated,
+        "roles": list(recording._main.facts.roles),
     }
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     names, separator = _head(path, text)
     is_comma = separator != "," and any("," in line for line in text.head[1:])
     how = Table(separator=separator, decimal="," if is_comma else ".", time_column=1, time_unit="us")
+    how = replace(how, events=tuple(names[:4]) == EVENTS)
     form = Form(how, tuple(names), 1)
     if any(line.strip() for line in text.head[1:]):
         rows = read_rows(text, form, ends_empty=names[-1] == "intensity")
