@@ -187,21 +187,20 @@ def test_what_a_line_does_not_hold_is_counted_and_a_missing_value_too(tmp_path: 
     os.mkfifo(pipe)
     writer = os.open(pipe, os.O_RDWR)
     os.write(writer, b"t_us,ax,ay\n")
-    sound = b"1000,1,2\n2000,nan,2\n3000,nan,NaN\n4000,-3e38,4\n"
-    strange = b"2500,inf,1\n2500,-Infinity,1\n2500,1e400,1\n2500,1e39,1\n2500,1_0,1\n"
+    sound = b"1000,1,2\n2000,nan,2\n3000,nan,NaN\n4000,-3e38,4\n4500,inf,5\n"
+    strange = b"2500,-Infinity,1\n2500,1e400,1\n2500,1e39,1\n2500,1_0,1\n"
     no_time = b"5000000000000000,1,1\nnan,1,1\n-1e300,1,1\n"
     with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"lines:{pipe}"}) as live:
         os.write(writer, sound + strange + "2500,\u0663,1\n".encode() + no_time)
         until(lambda: lines(live, "imu") == 13)
     os.close(writer)
     imu = taxel.open(tmp_path / "imu.mcap").sources["imu"]
-    np.testing.assert_array_equal(imu.frames().t, [1000, 2000, 3000, 4000])
-    np.testing.assert_array_equal(
-        imu.frames().values[:, 0], np.float32([[1, 2], [np.nan, 2], [np.nan, np.nan], [-3e38, 4]])
-    )
-    assert imu.verdict.damaged == {"lines_that_could_not_be_read": 9}
-    assert imu.verdict.noted == {"missing_values": 3}
-    assert "9 lines that could not be read; 3 missing values" in imu.verdict
+    np.testing.assert_array_equal(imu.frames().t, [1000, 2000, 3000, 4000, 4500])
+    values = np.float32([[1, 2], [np.nan, 2], [np.nan, np.nan], [-3e38, 4], [np.nan, 5]])
+    np.testing.assert_array_equal(imu.frames().values[:, 0], values)
+    assert imu.verdict.damaged == {"lines_that_could_not_be_read": 8}
+    assert imu.verdict.noted == {"missing_values": 4}
+    assert "8 lines that could not be read; 4 missing values" in imu.verdict
 
 
 @contextlib.contextmanager
