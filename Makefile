@@ -132,7 +132,7 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	@# What stands beside taxel uses its public names alone; only the rules, of one version with it, need private ones.
-	$(BIN)/ruff check --preview --select SLF001,PLC2701 $(BESIDE:%=%/taxel_%)
+	$(BIN)/ruff check --preview --select SLF001,PLC2701 $(foreach beside,$(BESIDE),$(beside)/taxel_$(beside))
 	@# The docstring of a command is its help, which lists no errors.
 	$(BIN)/flake8 --isolated --select DOC104,DOC202,DOC403,DOC501 --style numpy \
 		--per-file-ignores='*/cli/*:DOC501,*/_command.py:DOC501' $(SOURCES_OF_PYTHON)

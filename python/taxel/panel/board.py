@@ -92,6 +92,11 @@ class Board:
         ----------
         again : bool
             Whether the number of channels is known, for which a board without a greeting is waited for.
+
+        Raises
+        ------
+        DeviceError : the line gives no answer, or is lost
+        OSError : the line cannot be opened again
         """
         with self._lock:
             cable = self._connected()
