@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.table_text import Text
-from taxel.formats import column_names
-from taxel.formats.column_names import time_unit
+from taxel.formats.column_names import FORCES, OTHER_UNITS, axes_of, is_time, says, time_unit
 from taxel.formats.form import left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
@@ -134,7 +133,7 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
             draft.ask(why, "time_unit", {"hours and minutes": {"time_unit": ISO}}, column)
     if draft.is_stated("time_column"):
         return column
-    is_sure = column_names.is_time(names[column]) and fit.ascends(column)
+    is_sure = is_time(names[column]) and fit.ascends(column)
     draft.be("time", draft.roles[column].why or "named so", column, certainty=SURE if is_sure else LIKELY)
     draft.set(time_column=draft.called(column))
     if _has_milliseconds(fit, column):
@@ -166,7 +165,7 @@ def _named_time(draft: Draft) -> tuple[int | None, list[int]]:
         if fit.types[k] not in ("number", "time") or k in left:
             continue
         # A letter may be the name of a taxel too: it is the time where it comes first, or ascends.
-        is_called = column_names.is_time(names[k]) and (k == 0 or len(names[k]) > 1)
+        is_called = is_time(names[k]) and (k == 0 or len(names[k]) > 1)
         if is_called or (time_unit(names[k]) is not None and fit.ascends(k)):
             scores[k] = 3 + is_called + 2 * fit.ascends(k)
         elif fit.types[k] == "time":
@@ -222,7 +221,7 @@ def _unnamed_time(draft: Draft) -> int | None:
     if len(fit.body) < 3 or fit.count < 2:
         return None
     even = [k for k in range(len(names)) if not (k and names[k]) and _rises(fit, k) and _is_even(fit.numbers(k))]
-    even = [k for k in even if not names[k] or (len(fit.body) >= _ASCENDS and not column_names.is_counter(names[k]))]
+    even = [k for k in even if not names[k] or (len(fit.body) >= _ASCENDS and not says("counter", names[k]))]
     even = sorted({*even} - draft.stated_left)
     times = [k for k in even if not fit.counts(k)]
     few = len(fit.body) < _ASCENDS
@@ -297,7 +296,7 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
     fit, name = draft.fit, draft.names[column]
     kind, cells = fit.types[column], [cell for cell in fit.cells(column) if cell not in MISSING]
     few, reads = len(set(cells)) <= _KEYS, f"; label_column = {draft.called(column)!r} reads them"
-    is_time = time_unit(name) is not None and len(name) > 1
+    of_time = time_unit(name) is not None and len(name) > 1
     if kind == "day":
         yield "no taxel", "a date"
     if kind == "text":
@@ -308,15 +307,15 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
             why = f"decimal {marks[other == ',']} in column {called}, {marks[other == '.']} in others"
             draft.ask(f"{why}; save it with one", "leave_out", alone, column)
             yield "no taxel", "decimal marks that others have not"
-        if not is_time and not few and all(map(_GLUED.match, cells)):
+        if not of_time and not few and all(map(_GLUED.match, cells)):
             draft.ask(f"column {called} has numbers with other text, as {cells[0]!r}", "leave_out", alone, column)
         in_turn = 3 * sum(a != b for a, b in pairwise(cells)) > len(cells)
-        is_whole = len(cells) == len(fit.body) and not column_names.is_label(name)
-        is_key = is_whole and few and (column_names.is_key(name) or (in_turn and len(set(cells)) > 1))
-        yield "no taxel", "times in a form that taxel does not read" * is_time
+        is_whole = len(cells) == len(fit.body) and not says("label", name)
+        is_key = is_whole and few and (says("sensor", name) or (in_turn and len(set(cells)) > 1))
+        yield "no taxel", "times in a form that taxel does not read" * of_time
         yield "sensor", _key(draft, column) if is_key else ""
         yield "label", f"texts{reads * (len(set(cells)) > 1)}"
-    if kind == "time" or is_time or (name and fit.ascends(column) and fit.epoch(column)):
+    if kind == "time" or of_time or (name and fit.ascends(column) and fit.epoch(column)):
         yield "no taxel", "another time"
     numbers = fit.numbers(column)
     whole = bool((numbers[np.isfinite(numbers)] % 1 == 0).all())
@@ -326,15 +325,16 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
     # An index may be a finger.
     few_lines = len(fit.body) < _ASCENDS
     may_count = few_lines or len(set(cells)) == 1 or bool((np.diff(numbers) > 0).mean() >= 0.2)
-    if counts or (column_names.is_counter(name) and whole and may_count):
+    if counts or (says("counter", name) and whole and may_count):
         yield "counter", "a counter"
-    yield "label", f"labels{reads}" * (column_names.is_label(name) and few)
-    if column_names.is_key(name) and whole:
+    yield "label", f"labels{reads}" * (says("label", name) and few)
+    if says("sensor", name) and whole:
         # Lines of one time may be of many taxels.
         is_clock = _rises(fit, column) and _is_even(numbers) and not fit.counts(column)
         repeats = few or 2 * len(set(cells)) <= len(cells)
         yield "sensor", _key(draft, column) if repeats else "" if is_clock else "a counter"
-    yield "no taxel", "another quantity" * column_names.is_other(name, draft.units[column])
+    is_other = says("other", name) or OTHER_UNITS.fullmatch(draft.units[column]) is not None
+    yield "no taxel", "another quantity" * is_other
 
 
 def _key(draft: Draft, column: int) -> str:
@@ -368,7 +368,7 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
     pairs = len(set(zip(times, texts, strict=False)))
     # The last frame may be a part.
     is_whole = pairs == len(texts) and len(set(times)) * len(known) - pairs < len(known)
-    of_taxels = bool(grid) or column_names.names_taxels(draft.names[keys[0]])
+    of_taxels = bool(grid) or says("taxel", draft.names[keys[0]])
     if len(values) == 1 and len(known) > 1 and is_whole and of_taxels:
         sizes = [len(set(fit.cells(k))) for k in keys]
         draft.size = (sizes[0], sizes[1]) if len(keys) > 1 and sizes[0] * sizes[1] == len(known) else None
@@ -406,7 +406,7 @@ def _grid(draft: Draft, taxels: Sequence[int]) -> list[int]:
 def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
     """Return the columns in the unit that is stated or of most, of a force or pressure if there is one."""
     units = Counter(draft.units[k] for k in taxels if draft.units[k])
-    forces = Counter({unit: count for unit, count in units.items() if column_names.is_force(unit)})
+    forces = Counter({unit: count for unit, count in units.items() if FORCES.fullmatch(unit)})
     (unit, count), *others = (forces or units).most_common() or [("", 0)]
     if draft.layout.unit in units:
         unit, others = draft.layout.unit or "", []
@@ -435,7 +435,7 @@ def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> 
     alone = [k for k in taxels if draft.fit.types[k] == "number" and k not in {*series}]
     alone += [k for k in series[-1:] if not draft.names[k]]
     alone = alone if len(alone) <= _BLOCKS else []
-    are_axes = column_names.axes_of([draft.names[k] for k in taxels]) is not None
+    are_axes = axes_of([draft.names[k] for k in taxels]) is not None
     if draft.is_stated("leave_out", "keep") or len(taxels) < 3 or are_axes or draft.table.has_lines:
         return taxels
     fit = draft.fit.over(text.spread) if alone else draft.fit
