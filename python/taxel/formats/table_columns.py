@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.table_text import Text
-from taxel.formats.column_names import FORCES, OTHER_UNITS, axes_of, is_time, says, time_unit
+from taxel.formats.column_names import FORCES, OTHER_UNITS, axes_of, is_time, says, time_unit, unit_of
 from taxel.formats.form import left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
@@ -43,6 +43,7 @@ class Draft:
     fit: Fit
     table: Table
     names: tuple[str, ...]
+    #: Of the columns; none: as their names say.
     units: tuple[str, ...]
     #: What is stated of it.
     layout: Layout
@@ -53,6 +54,7 @@ class Draft:
     size: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
+        self.units = self.units or tuple(map(unit_of, self.names))
         self.roles = [
             Role(name or f"column {k + 1}", self.fit.cells(k)[:FIRST], unit=unit)
             for k, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
@@ -115,23 +117,25 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     With `by_name` it is one by its name or its cells alone.
     """
     fit, names = draft.fit, draft.names
-    column, others = _stated_time(draft), list[int]()
-    if column is None and not draft.is_stated("time_column"):
+    is_stated, stated, others = draft.is_stated("time_column"), draft.table.time_column, list[int]()
+    places = places_of(names, "time_column", stated) if is_stated and stated else ()
+    draft.be("time", "stated", *places, certainty=SURE)
+    column = next(iter(places), None)
+    if not is_stated:
         column, others = _named_time(draft)
         if column is None and draft.table.frame_time is None and not by_name and fit.kind != "hex":
             column = _unnamed_time(draft)
     if column is None:
         return None
     draft.be("no taxel", "another time", *others)
-    is_two = "+" in str(draft.table.time_column or "") and draft.is_stated("time_column")
     if not draft.is_stated("time_unit"):
         is_text = fit.types[column] == "time"
-        draft.set(time_unit=ISO if is_text else "s" if is_two else _unit_of_time(draft, column))
+        draft.set(time_unit=ISO if is_text else "s" if len(places) > 1 else _unit_of_time(draft, column))
         if is_text and all(map(is_of_two_numbers, fit.cells(column))):
             example = fit.cells(column)[-1]
             why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
             draft.ask(why, "time_unit", {"hours and minutes": {"time_unit": ISO}}, column)
-    if draft.is_stated("time_column"):
+    if is_stated:
         return column
     is_sure = is_time(names[column]) and fit.ascends(column)
     draft.be("time", draft.roles[column].why or "named so", column, certainty=SURE if is_sure else LIKELY)
@@ -147,14 +151,6 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     draft.be("time", "seconds and nanoseconds", seconds, seconds + 1, certainty=SURE)
     draft.answer("time_unit")
     return seconds
-
-
-def _stated_time(draft: Draft) -> int | None:
-    """Return the first column of times that the layout states; None if it states none."""
-    stated = draft.table.time_column if draft.is_stated("time_column") else None
-    places = places_of(draft.names, "time_column", stated) if stated else ()
-    draft.be("time", "stated", *places, certainty=SURE)
-    return next(iter(places), None)
 
 
 def _named_time(draft: Draft) -> tuple[int | None, list[int]]:

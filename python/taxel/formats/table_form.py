@@ -38,8 +38,6 @@ from taxel.formats.times import FEW_ODD, ODD, unit_of_times
 
 #: Two readings fit about equally if one fits this share of the other.
 _EQUALLY = 0.999
-#: What another reading of lines does not leave out.
-_NOTHING_FOUND: Changes = {"time_column": None, "leave_out": []}
 #: A line above a frame: a word and the frame's number, or its time, or both.
 _ABOVE_FRAME = re.compile(
     r"\s*(?P<word>[^\W\d_]+)[ \t:=#.]*(?P<number>\d+(?:[.,]\d+)?)[ \t]*(?P<unit>[mun]?s)?"
@@ -204,7 +202,9 @@ def _decided(draft: Draft, other: Draft) -> Draft:
     first, second = (counted(each.fit.count, "column") for each in (draft, other))
     keys = ("separator", "decimal", "thousands", "skip_lines", "lines")
     ways = {name: {key: getattr(each.table, key) for key in keys} for name, each in ((first, draft), (second, other))}
-    draft.ask(f"{first} or {second}", "separator", {first: ways[first], second: {**ways[second], **_NOTHING_FOUND}})
+    # What was found of one reading is not left out of the other.
+    ways[second] |= {"time_column": None, "leave_out": []}
+    draft.ask(f"{first} or {second}", "separator", ways)
     return draft
 
 
@@ -215,20 +215,16 @@ def draft_of(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
     ------
     FormatError : another number of names is stated
     """
-    draft = _called(fit, lines, layout)
-    stated = layout.table or Table()
+    draft, stated = _called(fit, lines, layout), layout.table or Table()
+    if stated.columns or draft.is_stated("skip_lines"):
+        draft.set(skip_lines=stated.skip_lines)
     if not stated.columns:
-        return draft if not draft.is_stated("skip_lines") else replace(draft, table=_skipping(draft, stated.skip_lines))
+        return draft
     names = tuple(map(str, stated.columns))
     if not len(draft.names) <= len(names) <= fit.count:
         here = f"{counted(len(names), 'name')} for {counted(len(draft.names), 'column')}"
         raise unreadable(here, line=stated.skip_lines + 1)
-    units = tuple(map(column_names.unit_of, names))
-    return replace(draft, table=_skipping(draft, stated.skip_lines), names=names, units=units)
-
-
-def _skipping(draft: Draft, count: int) -> Table:
-    return replace(draft.table, skip_lines=count)
+    return replace(draft, names=names, units=())
 
 
 def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
@@ -244,12 +240,12 @@ def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
         names = own if any(own) else _names_above_marks(fit, lines)
         if not any(own) and any(names):
             table = replace(table, columns=list(names))
-        return Draft(fit, table, names, tuple(map(column_names.unit_of, names)), layout)
+        return Draft(fit, table, names, (), layout)
     real = fit.count
     while real > 1 and fit.types[real - 1] == "empty":
         real -= 1
     head = [(k, row) for k, cells in above[-3:] if (row := _names_in(cells, fit.count, real))]
-    unnamed = Draft(fit, table, ("",) * real, ("",) * real, layout)
+    unnamed = Draft(fit, table, ("",) * real, (), layout)
     if not head or head[-1][0] < above[-1][0]:
         return _numbered(unnamed)
     has_units = len(head) > 1 and column_names.are_units(head[-2][1], head[-1][1])
@@ -261,9 +257,8 @@ def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
     named = [name for name in names if name]
     if len(set(named)) < len(named) and len(head) > 1 and any(head[-2][1]):
         names = tuple(_below(head[-2][1], names))
-        units = tuple(map(column_names.unit_of, names))
-        return Draft(fit, replace(table, columns=list(names)), names, units, layout)
-    stripped = tuple(unit.strip("[]()") for unit in units[: len(names)]) or tuple(map(column_names.unit_of, names))
+        return Draft(fit, replace(table, columns=list(names)), names, (), layout)
+    stripped = tuple(unit.strip("[]()") for unit in units[: len(names)])
     return Draft(fit, replace(table, skip_lines=at_names), names, stripped, layout)
 
 
