@@ -15,7 +15,8 @@ from taxel.formats.column_names import time_unit
 from taxel.formats.form import Form, place_of, places_of
 from taxel.formats.layout import Layout, PrintedFrames
 from taxel.formats.line_fits import FITS, fits_in
-from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, said_of, taxels_of, time_of
+from taxel.formats.roles import SURE
+from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, find_taxels, said_of, time_of
 from taxel.formats.table_form import draft_of, lines_between_blanks
 from taxel.formats.times import ISO, UNITS_US
 
@@ -70,6 +71,7 @@ def form_of_lines(
     draft.set(frame_lines=stated.frame_lines, frame_end=keys.get("frame_end", stated.frame_end))
     if times:
         draft.set(time_column=stated.time and stated.time.partition(":")[0])
+        draft.be("time", "stated", *times, certainty=SURE)
         _set_unit(draft, times, stated.time, unit_of)
     elif not is_whole:
         time = time_of(draft, by_name=not are_taxels)
@@ -86,8 +88,9 @@ def form_of_lines(
         draft.be("no taxel", "texts", *(k for k in range(len(draft.names)) if fit.types[k] == "text"))
         taxels = [k for k in range(len(draft.names)) if k not in {*left, *times, *draft.left}]
     else:
-        taxels = [k for k in taxels_of(draft, time) if k not in left]
-        taxels = by_key(draft, time, taxels, lambda: lines)
+        find_taxels(draft)
+        by_key(draft, time, lambda: lines)
+        taxels = draft.taxels
     if not taxels:
         raise ProblemError("lines have no column of values, only times and columns that are left out")
     unclear = [question.why for question in draft.questions]

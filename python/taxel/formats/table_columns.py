@@ -65,6 +65,11 @@ class Draft:
         """Why each column is left out that is."""
         return {k: role.why for k, role in enumerate(self.roles) if role.is_left}
 
+    @property
+    def taxels(self) -> list[int]:
+        """The columns of readings."""
+        return [k for k, role in enumerate(self.roles) if role.role == "taxel"]
+
     @cached_property
     def stated_left(self) -> set[int]:
         """The columns that the layout leaves out."""
@@ -257,34 +262,31 @@ def _unit_of_time(draft: Draft, column: int) -> str:
     return unit
 
 
-def taxels_of(draft: Draft, time: int | None) -> list[int]:
-    """Return the columns of readings, and say why the others are none."""
+def find_taxels(draft: Draft) -> None:
+    """Say which columns hold readings, and why the others hold none."""
     fit, names, table = draft.fit, draft.names, draft.table
-    known = {k for k, role in enumerate(draft.roles) if role.role == "time"}
     for key, role in (("label_column", "label"), ("by", "sensor"), ("taxel_column", "taxel's name")):
         stated = getattr(table, key)
         places = places_of(names, key, stated) if stated else ()
         draft.be(role, "stated", *places, certainty=SURE)
-        known |= {*places}
     if draft.is_stated("leave_out", "keep"):
-        others = {*range(len(names))} - known - draft.stated_left
-        taxels = sorted(k for k in others if table.keeps(names[k]))
-        draft.be("taxel", "stated", *taxels, certainty=SURE)
-        draft.be("no taxel", "stated", *({*range(len(names))} - known - {*taxels}), certainty=SURE)
-        return taxels
-    for k in range(len(names)):
-        if k in known or draft.roles[k].is_left:
-            continue
-        role, why = next((each for each in _reasons(draft, k, first=int(time == 0)) if each[1]), ("", ""))
-        if why:
+        others = [k for k, role in enumerate(draft.roles) if role.role in ("taxel", "no taxel")]
+        for k in others:
+            is_taxel = k not in draft.stated_left and table.keeps(names[k])
+            draft.be("taxel" if is_taxel else "no taxel", "stated", k, certainty=SURE)
+        return
+    first = int(draft.roles[0].role == "time")
+    for k in draft.taxels:
+        # Another column may have said what this one is.
+        role, why = next((each for each in _reasons(draft, k, first) if each[1]), ("", ""))
+        if why and not draft.roles[k].is_left:
             draft.be(role, why, k)
-    taxels = [k for k in range(len(names)) if k not in known and not draft.roles[k].is_left]
-    if not taxels:
+    if not draft.taxels:
         # A sensor may have one taxel, and its name be that of a state.
         of_state = ("labels", "another quantity")
-        taxels = [k for k, why in draft.left.items() if fit.types[k] == "number" and why.startswith(of_state)]
-        draft.be("taxel", "", *taxels)
-    return _of_one_unit(draft, taxels)
+        named = (k for k, why in draft.left.items() if fit.types[k] == "number" and why.startswith(of_state))
+        draft.be("taxel", "", *named)
+    _leave_out_other_units(draft)
 
 
 def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]:
@@ -347,16 +349,16 @@ def _key(draft: Draft, column: int) -> str:
     return f"always {next(iter(keys))}" if len(keys) == 1 else "by"
 
 
-def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callable[[], Iterable[str]]) -> list[int]:
-    """Return the columns of readings where another names the taxel or the sensor of each line; if it is open, ask.
+def by_key(draft: Draft, time: int | None, all_lines: Callable[[], Iterable[str]]) -> None:
+    """Say what lines are of which a column names the taxel or the sensor; if it is open, ask.
 
     If each time has one reading of each key, these are the taxels of an array.
     """
-    fit, called = draft.fit, draft.called
+    fit, called, taxels = draft.fit, draft.called, draft.taxels
     grid = _grid(draft, taxels)
     keys = [] if draft.key is None and not grid else grid or [draft.key or 0]
     if not keys or draft.is_stated("by", "taxel_column", "leave_out", "keep"):
-        return taxels
+        return
     values = [k for k in taxels if k not in keys]
     texts = [" ".join(cells) for cells in zip(*map(fit.cells, keys), strict=True)]
     known = sorted(set(texts))
@@ -372,9 +374,9 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
         name = "+".join(str(called(k)) for k in keys)
         draft.set(taxel_column=name if len(keys) > 1 else called(keys[0]))
         draft.said.append(f"a taxel for each {name}")
-        return values
+        return
     if grid or (len(known) == 1 and all(known[0] in line or not any(map(str.isdigit, line)) for line in all_lines())):
-        return taxels
+        return
     key = called(keys[0])
     choices: dict[str, Changes] = {f"a source for each: by = {key!r}": {"by": key, "read": [key]}}
     if len(taxels) == 1 and times and (len(known) == 1 or pairs > len(set(times))):
@@ -389,7 +391,6 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
         keys[0],
         first=True,
     )
-    return taxels
 
 
 def _grid(draft: Draft, taxels: Sequence[int]) -> list[int]:
@@ -399,15 +400,14 @@ def _grid(draft: Draft, taxels: Sequence[int]) -> list[int]:
     return next(([by_name[a], by_name[b]] for a, b in pairs if len(taxels) == 3 and {a, b} < set(by_name)), [])
 
 
-def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
-    """Return the columns in the unit that is stated or of most, of a force or pressure if there is one."""
+def _leave_out_other_units(draft: Draft) -> None:
+    """Keep the columns in the unit that is stated or of most, of a force or pressure if there is one."""
+    taxels = draft.taxels
     units = Counter(draft.units[k] for k in taxels if draft.units[k])
     forces = Counter({unit: count for unit, count in units.items() if FORCES.fullmatch(unit)})
     (unit, count), *others = (forces or units).most_common() or [("", 0)]
     if draft.layout.unit in units:
         unit, others = draft.layout.unit or "", []
-    if not unit:
-        return taxels
     if others and others[0][1] == count:
         other = others[0][0]
         moved, kept = ([draft.called(k) for k in taxels if draft.units[k] == each] for each in (unit, other))
@@ -416,15 +416,15 @@ def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
     for k in taxels:
         if draft.units[k] not in ("", unit):
             draft.be("no taxel", f"in {draft.units[k]}", k)
-    return [k for k in taxels if not draft.roles[k].is_left]
 
 
-def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> list[int]:
-    """Return the columns of readings without those that hold something else by their values; ask of those that may.
+def by_values(draft: Draft, time: int | None, text: Text) -> None:
+    """Say which columns hold something else than readings by their values; ask of those that may.
 
     The values are those of the first lines and of some over the whole text. A column of a series, whose names differ in
     a number, is one as the others are.
     """
+    taxels = draft.taxels
     stems = [re.sub(r"\d+", "#", name) for name in draft.names]
     counts = Counter(stems[k] for k in taxels)
     series = [k for k in taxels if not draft.names[k] or counts[stems[k]] >= _SERIES]
@@ -433,7 +433,7 @@ def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> 
     alone = alone if len(alone) <= _BLOCKS else []
     are_axes = axes_of([draft.names[k] for k in taxels]) is not None
     if draft.is_stated("leave_out", "keep") or len(taxels) < 3 or are_axes or draft.table.has_lines:
-        return taxels
+        return
     fit = draft.fit.over(text.spread) if alone else draft.fit
     whole = np.column_stack([fit.wide(k) for k in taxels]) if alone else np.empty((0, len(taxels)))
     usual = np.median([len(set(fit.cells(k))) for k in taxels[:: 1 + len(taxels) // 64]])
@@ -469,7 +469,6 @@ def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> 
         choices["they are taxels too"] = {"read": called}
         what = ", ".join(f"{draft.called(k)} ({draft.roles[k].why})" for k in asked[:8])
         draft.ask(f"may be no taxels: {what}", "leave_out keep", choices, *asked)
-    return [k for k in taxels if not draft.roles[k].is_left]
 
 
 def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
@@ -498,12 +497,12 @@ def _is_total(own: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
     return False
 
 
-def are_events(draft: Draft, time: int | None, taxels: Sequence[int]) -> bool:
+def are_events(draft: Draft, time: int | None) -> bool:
     """Return whether lines are events, by the names of the columns; where four have none and may be events, ask.
 
     The rate of events says nothing of the unit of their times, as that of frames does: without a name it is asked.
     """
-    fit, units = draft.fit, ("us", "ms", "s")
+    fit, taxels, units = draft.fit, draft.taxels, ("us", "ms", "s")
     choices: dict[str, Changes]
     called = {EVENT_COLUMNS.get(name, name): k for k in taxels for name in [draft.names[k].lower()]}
     named = [called[name] for name in "xyp" if name in called]

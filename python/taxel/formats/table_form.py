@@ -30,8 +30,8 @@ from taxel.formats.table_columns import (
     ask_for_lines_of_one_time,
     by_key,
     by_values,
+    find_taxels,
     said_of,
-    taxels_of,
     time_of,
 )
 from taxel.formats.times import FEW_ODD, ODD, unit_of_times
@@ -117,21 +117,21 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
     is_laid_out = layout.rows is not None or layout.rate_hz is not None
     if time is None and draft.table.frame_time is None and not is_laid_out:
         _without_times(draft, text)
-    taxels = taxels_of(draft, time)
-    if not taxels:
+    find_taxels(draft)
+    if not draft.taxels:
         raise unreadable("contains no column of readings", text.path)
-    taxels = by_key(draft, time, taxels, text.lines)
+    by_key(draft, time, text.lines)
     if time is not None and draft.table.taxel_column is None:
         ask_for_lines_of_one_time(draft, time)
-    are = are_events(draft, time, taxels)
+    are = are_events(draft, time)
     if not are and draft.table.taxel_column is None:
-        taxels = by_values(draft, time, taxels, text)
+        by_values(draft, time, text)
     if not draft.is_stated("leave_out", "keep"):
         left = (k for k, role in enumerate(draft.roles) if role.is_left and role.certainty != SURE)
         of_taxel = places_of(draft.names, "", draft.table.taxel_column) if draft.table.taxel_column else ()
         draft.set(leave_out=[draft.called(k) for k in left if k not in of_taxel])
     full = replace(layout, table=draft.table)
-    full = full if are else _with_size(full, draft, taxels)
+    full = full if are else _with_size(full, draft)
     unread = [draft.called(k) for k, why in draft.left.items() if why.startswith("times in")]
     if unread and time is None and draft.table.frame_time is None:
         right = "write them as 2024-05-01T10:00:00.25, or state rate_hz and leave_out in a layout file"
@@ -416,8 +416,9 @@ def _without_times(draft: Draft, text: Text) -> None:
     draft.ask(f"{counted(count, 'line')}, no times", keys, choices)
 
 
-def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
+def _with_size(layout: Layout, draft: Draft) -> Layout:
     """Return the layout with its unit, its axes (which are asked), and rows and columns that the names state."""
+    taxels = draft.taxels
     unit = next((draft.units[k] for k in taxels if draft.units[k]), "")
     full = replace(layout, unit=layout.unit or unit or None)
     names = [draft.names[k] for k in taxels]
