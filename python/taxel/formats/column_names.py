@@ -41,35 +41,25 @@ _WITH_UNIT_OF_TIME = re.compile(
 #: A name with the word: SampleTimeFine, time_of_board.
 _WITH_WORD = re.compile(r".*?(?:\b|_|(?<=[a-z]))(?:[Tt]ime|TIME|[Tt]imestamp|[Zz]eit)(?:\b|_|(?=[A-Z])).*")
 
-_COUNTERS = re.compile(
-    r"(?:frame|sample|record|packet|line|row|msg|message)?[ ._]*"
+_TAXEL = r"sensor|channel|taxel|cell|electrode|node|pad"
+#: What columns are that hold no readings, by what they are called.
+_KINDS = {
+    "counter": r"(?:frame|sample|record|packet|line|row|msg|message)?[ ._]*"
     r"(?:seq(?:uence)?|frames?|index|idx|samples?|records?|id|no|nr|num|number|count(?:er)?|#|bild|lfd)[ ._]*"
     r"(?:nr|no|num|number|id|#|count(?:er)?|index)?\.?",
-    re.IGNORECASE,
-)
-_LABELS = re.compile(
-    r"(?:.*[ ._])?(?:labels?|class(?:es)?|slip|slipped|slipping|contact|in_contact|touch(?:ed)?|state|status|flags?|"
-    r"targets?|events?|phase|annotations?|markers?|trigger|ground[ _]?truth|gt|activity|gesture|grasp(?:ed)?)"
+    "label": r"(?:.*[ ._])?(?:labels?|class(?:es)?|slip|slipped|slipping|contact|in_contact|touch(?:ed)?|state|status|"
+    r"flags?|targets?|events?|phase|annotations?|markers?|trigger|ground[ _]?truth|gt|activity|gesture|grasp(?:ed)?)"
     r"(?:[ ._](?:id|label|class|code))?",
-    re.IGNORECASE,
-)
-_TAXEL = r"sensor|channel|taxel|cell|electrode|node|pad"
-_OF_TAXELS = re.compile(rf"(?:{_TAXEL})(?:[ ._]?(?:id|name|no|nr))?", re.IGNORECASE)
-_KEYS = re.compile(
-    rf"(?:{_TAXEL}|hand|foot|side|finger|device|board|insole|limb|topic|source|module"
-    r"|trial|session|run|subject|person|participant|versuch|proband)"
-    r"(?:[ ._]?(?:id|name|no|nr))?",
-    re.IGNORECASE,
-)
-_OTHERS = re.compile(
+    "taxel": rf"(?:{_TAXEL})(?:[ ._]?(?:id|name|no|nr))?",
+    "sensor": rf"(?:{_TAXEL}|hand|foot|side|finger|device|board|insole|limb|topic|source|module"
+    r"|trial|session|run|subject|person|participant|versuch|proband)(?:[ ._]?(?:id|name|no|nr))?",
     # A lateral sensor of a foot is no latitude.
-    r"(?:[agm][ ._]?[xyz])|(?:g[pn]ss?[ ._])?(?:lat|lon)|(?:.*[ ._])?"
+    "other": r"(?:[agm][ ._]?[xyz])|(?:g[pn]ss?[ ._])?(?:lat|lon)|(?:.*[ ._])?"
     r"(?:acc(?:el(?:eration)?)?|gyro?(?:scope)?|mag(?:netometer)?|imu|temp(?:erature)?|temperatur|"
     r"(?:total|sum|net|mean|avg|average|summe|gesamt)[ ._-]?(?:force|load|weight|pressure|kraft|last|druck)|"
     r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|latitude|longitude|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop|total|sum|summe)"
     r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
-    re.IGNORECASE,
-)
+}
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
 #: A unit of a force, a pressure or a voltage that ends a name behind a low line, "in" or alone: thumb_mN, mV.
@@ -78,8 +68,9 @@ _BARE_UNIT = re.compile(rf"(?:^|(?<=_)|(?<= in ))({_BARE})$")
 #: A unit behind the number of a cell: 12.3N, 5 ms.
 UNIT_BEHIND = re.compile(rf"(?<=\d) ?({_BARE}|{_SHORT_UNIT_OF_TIME}|min|N/cm[2²]|%|°C|g|mm)(?![\w/])")
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()][^\s\[\]()]{0,7})\s*[\])]$")
-_FORCES = re.compile(r"[mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|counts|raw|adc", re.IGNORECASE)
-_OTHER_UNITS = re.compile(r"°[CF]?|deg(?:/s)?|rad(?:/s)?|dps|m/s(?:\^?[2²])?|Hz|bpm", re.IGNORECASE)
+#: Units of forces, of pressures and of counts, and of other quantities.
+FORCES = re.compile(r"[mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|counts|raw|adc", re.IGNORECASE)
+OTHER_UNITS = re.compile(r"°[CF]?|deg(?:/s)?|rad(?:/s)?|dps|m/s(?:\^?[2²])?|Hz|bpm", re.IGNORECASE)
 _AXIS = re.compile(r"(.+?)[ _.\-]?[\[(]?([xyzXYZ])[\])]?(?: *[\[(][^\])]*[\])])?")
 _AXIS_OF_LIST = re.compile(r"(.+)\[([012])\]")
 _PLACE = re.compile(r"\D*?(\d+)\D+(\d+)\D*")
@@ -121,29 +112,22 @@ def last_part(name: str) -> str:
     return re.split(r"[/.](?=[^\W\d])", name.strip("\"' "))[-1]
 
 
-def is_counter(name: str) -> bool:
-    """Return whether a column numbers the lines: seq, frame, Index, sample_no."""
-    return _COUNTERS.fullmatch(last_part(name)) is not None
+def says(kind: str, name: str) -> bool:
+    """Return whether the name of a column says that it is of a kind.
 
+    Parameters
+    ----------
+    kind : {"counter", "label", "sensor", "taxel", "other"}
+        "counter" numbers the lines; "label" holds labels or states; "sensor" says which sensor a line is of, and
+        "taxel" which taxel, if each has one reading a line; "other" is of another quantity than force or pressure.
+    name : str
 
-def is_label(name: str) -> bool:
-    """Return whether a column holds labels or states: label, slipped, contact state."""
-    return _LABELS.fullmatch(last_part(name)) is not None
-
-
-def is_key(name: str) -> bool:
-    """Return whether a column says which sensor a line is of: hand, sensor_id."""
-    return _KEYS.fullmatch(last_part(name)) is not None
-
-
-def names_taxels(name: str) -> bool:
-    """Return whether a column says which taxel a line is of, if each has one reading a line: sensor, taxel_id."""
-    return _OF_TAXELS.fullmatch(last_part(name)) is not None
-
-
-def is_other(name: str, unit: str = "") -> bool:
-    """Return whether a column is of another quantity than force or pressure: acc_x, Battery [%], a knee in °."""
-    return _OTHERS.fullmatch(last_part(name)) is not None or _OTHER_UNITS.fullmatch(unit) is not None
+    Examples
+    --------
+    >>> says("counter", "sample_no"), says("label", "contact state"), says("sensor", "hand"), says("other", "acc_x")
+    (True, True, True, True)
+    """
+    return re.fullmatch(_KINDS[kind], last_part(name), re.IGNORECASE) is not None
 
 
 def unit_of(name: str) -> str:
@@ -156,11 +140,6 @@ def unit_of(name: str) -> str:
     """
     found = _IN_BRACKETS.search(name) or _BARE_UNIT.search(name)
     return "" if found is None or found[1].lower() in AXES else found[1]
-
-
-def is_force(unit: str) -> bool:
-    """Return whether a unit is one of force or pressure, or of counts."""
-    return _FORCES.fullmatch(unit) is not None
 
 
 def are_units(names: Sequence[str], below: Sequence[str]) -> bool:

@@ -496,19 +496,11 @@ _TABLES: dict[str, type[Any]] = {
 _AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
 
 
-def _keys(table: str) -> list[str]:
-    """Return the keys of a table, "" for those that are in none; the mapping is that of a ROS bag."""
-    kind = _TABLES[table] if table else Layout
-    return (
-        ["topic", "field", "ros", "by"]
-        if kind is dict
-        else [f.name for f in fields(kind) if f.name not in ("path", "stated")]
-    )
-
-
 def _known(table: str, values: Mapping[str, Any]) -> None:
-    """Refuse a key that a table has not, and say where it belongs."""
-    names = _keys(table)
+    """Refuse a key that a table has not, "" for those that are in none; the mapping is that of a ROS bag."""
+    kind = _TABLES[table] if table else Layout
+    own = ["topic", "field", "ros", "by"] if kind is dict else [key.name for key in fields(kind)]
+    names = [name for name in own if name not in ("path", "stated")]
     unknown = next((name for name in values if name not in names), None)
     if unknown is not None:
         place = f"{table}.{unknown}" if table else unknown

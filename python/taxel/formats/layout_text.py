@@ -88,32 +88,29 @@ def refuse_open(path: Path, about: str, layout: Layout, roles: Sequence[Role], q
 
 def changed(layout: Layout, changes: Changes) -> Layout:
     """Return a layout with other keys, of its own, its table or its data, which it states, except those of nothing."""
-    inner: dict[str, Any] = {}
-    for name, kind in (("table", Table), ("data", Data)):
-        there = getattr(layout, name)
-        if there is not None:
-            keys = {key.name for key in fields(kind)} & changes.keys()
-            inner[name] = replace(there, **{key: changes[key] for key in keys})
+    said = {key for key, value in changes.items() if value not in (None, [])} - {"left", "read"}
     if layout.table is not None and {"left", "read"} & changes.keys():
         left = [column for column in layout.table.leave_out if column not in changes.get("read", ())]
         more = (column for column in changes.get("left", ()) if column not in left)
-        inner["table"] = replace(inner["table"], leave_out=[*left, *more])
-        changes = {**changes, "leave_out": "stated"}
-    known = {key.name for key in fields(Layout)} - {"columns"}
-    own = {key: value for key, value in changes.items() if key in known}
-    said = {key for key, value in changes.items() if value not in (None, [])} - {"left", "read"}
-    return replace(layout, **own, **inner, stated=layout.stated | said)
+        changes, said = {**changes, "leave_out": [*left, *more]}, said | {"leave_out"}
+    return _with(layout, changes, layout.stated | said)
 
 
 def without(layout: Layout, keys: frozenset[str]) -> Layout:
     """Return a layout that does not state some keys."""
-    inner: dict[str, Any] = {
-        name: replace(there, **{key.name: key.default for key in fields(there) if key.name in keys})
-        for name in ("table", "data")
-        if (there := getattr(layout, name)) is not None
-    }
-    own: dict[str, Any] = {key.name: key.default for key in fields(layout) if key.name in keys}
-    return replace(layout, **own, **inner, stated=layout.stated - keys)
+    defaults = {key.name: key.default for kind in (Table, Data, Layout) for key in fields(kind) if key.name in keys}
+    return _with(layout, defaults, layout.stated - keys)
+
+
+def _with(layout: Layout, values: Mapping[str, Any], stated: frozenset[str]) -> Layout:
+    """Return a layout with other values of its keys and of those of its table and its data."""
+    inner: dict[str, Any] = {}
+    for name in ("table", "data"):
+        if (there := getattr(layout, name)) is not None:
+            keys = {key.name for key in fields(there)} & values.keys()
+            inner[name] = replace(there, **{key: values[key] for key in keys})
+    own = {key.name for key in fields(Layout)} & values.keys() - {"columns"}
+    return replace(layout, **{key: values[key] for key in own}, **inner, stated=stated)
 
 
 def _written(value: object) -> str:

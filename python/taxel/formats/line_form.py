@@ -15,7 +15,8 @@ from taxel.formats.column_names import time_unit
 from taxel.formats.form import Form, place_of, places_of
 from taxel.formats.layout import Layout, PrintedFrames
 from taxel.formats.line_fits import FITS, fits_in
-from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, said_of, taxels_of, time_of
+from taxel.formats.roles import SURE
+from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, find_taxels, said_of, time_of
 from taxel.formats.table_form import draft_of, lines_between_blanks
 from taxel.formats.times import ISO, UNITS_US
 
@@ -69,15 +70,15 @@ def form_of_lines(
         draft.said.append(f"{group} lines per frame, between empty lines")
     draft.set(frame_lines=stated.frame_lines, frame_end=keys.get("frame_end", stated.frame_end))
     if times:
-        unit = _unit_of_stated(draft, stated.time or "", times, unit_of)
-        draft.set(time_column=stated.time and stated.time.partition(":")[0], time_unit=unit)
+        draft.set(time_column=stated.time and stated.time.partition(":")[0])
+        draft.be("time", "stated", *times, certainty=SURE)
+        _set_unit(draft, times, stated.time, unit_of)
     elif not is_whole:
         time = time_of(draft, by_name=not are_taxels)
         if time is not None and time not in left:
             times = places_of(names, "time", draft.table.time_column or 0)
             ask_for_lines_of_one_time(draft, time)
-            if len(times) == 1:
-                _set_found_unit(draft, time, unit_of, is_sure=not are_taxels)
+            _set_unit(draft, times, None, unit_of, is_sure=not are_taxels)
             keys["time"] = f"{draft.table.time_column}:{draft.table.time_unit}".removesuffix(":s" * (len(times) > 1))
         else:
             draft.set(time_column=None)
@@ -87,17 +88,16 @@ def form_of_lines(
         draft.be("no taxel", "texts", *(k for k in range(len(draft.names)) if fit.types[k] == "text"))
         taxels = [k for k in range(len(draft.names)) if k not in {*left, *times, *draft.left}]
     else:
-        taxels = [k for k in taxels_of(draft, time) if k not in left]
-        taxels = by_key(draft, time, taxels, lambda: lines)
+        find_taxels(draft)
+        by_key(draft, time, lambda: lines)
+        taxels = draft.taxels
     if not taxels:
         raise ProblemError("lines have no column of values, only times and columns that are left out")
-    if draft.questions or draft.table.taxel_column is not None:
-        why = (
-            draft.questions[0].why
-            if draft.questions
-            else f"column {draft.table.taxel_column} names the taxel of each line"
-        )
-        raise ProblemError(f"{why}: state what it is by time=COLUMN:UNIT, leave_out= or frame_lines=")
+    unclear = [question.why for question in draft.questions]
+    if draft.table.taxel_column is not None:
+        unclear.append(f"column {draft.table.taxel_column} names the taxel of each line")
+    if unclear:
+        raise ProblemError(f"{unclear[0]}: state what it is by time=COLUMN:UNIT, leave_out= or frame_lines=")
     gone = sorted(set(draft.left) - left - {*times} - {*taxels})
     if gone and are_taxels:
         keys["leave_out"] = ":".join([*map(str, stated.leave_out), *(str(k + 1) for k in gone)])
@@ -133,35 +133,23 @@ def stated_count(stated: PrintedFrames, size: int | None) -> int | None:
     return size // (stated.frame_lines or 1) + clocks + len(stated.leave_out)
 
 
-def _unit_of_stated(
+def _set_unit(
     draft: Draft,
-    time: str,
-    places: Sequence[int],
+    times: Sequence[int],
+    stated: str | None,
     unit_of: Callable[[NDArray[np.float64], Sequence[int]], str],
-) -> str:
-    """Return the unit of the column of times that is stated; without a unit it is found."""
-    fit, place = draft.fit, places[0]
-    column, _, unit = time.partition(":")
-    if len(places) > 1:
-        return "s"
-    if fit.types[place] == "time":
-        return ISO
-    if not unit:
-        unit = time_unit(draft.names[place]) or unit_of(fit.numbers(place), [fit.lines[k][0] for k in fit.body])
-    if unit not in (*UNITS_US, ISO):
-        known = ", ".join((*UNITS_US, ISO))
-        raise ProblemError(f"time={time}: the unit must be one of {known}, for example time={column}:ms")
-    return unit
-
-
-def _set_found_unit(
-    draft: Draft, time: int, unit_of: Callable[[NDArray[np.float64], Sequence[int]], str], *, is_sure: bool
+    *,
+    is_sure: bool = False,
 ) -> None:
-    """Set the unit of the column of times that was found: by its name, by arrival, or as it looks."""
-    fit, unit = draft.fit, draft.table.time_unit
-    if unit == ISO or time_unit(draft.names[time]):
+    """Set the unit of times: as it is stated, by the name of the column, by arrival, or, if not stated, as it looks."""
+    fit, time, (column, _, unit) = draft.fit, times[0], (stated or "").partition(":")
+    if len(times) > 1 or fit.types[time] == "time":
+        draft.set(time_unit=draft.table.time_unit if stated is None else "s" if len(times) > 1 else ISO)
         return
-    by_arrival = unit_of(fit.numbers(time), [fit.lines[k][0] for k in fit.body])
-    if by_arrival or is_sure:
-        draft.set(time_unit=by_arrival or unit)
+    unit = unit or time_unit(draft.names[time]) or unit_of(fit.numbers(time), [fit.lines[k][0] for k in fit.body])
+    if stated is not None and unit not in (*UNITS_US, ISO):
+        known = ", ".join((*UNITS_US, ISO))
+        raise ProblemError(f"time={stated}: the unit must be one of {known}, for example time={column}:ms")
+    if unit or is_sure:
+        draft.set(time_unit=unit or draft.table.time_unit)
         draft.answer("time_unit")

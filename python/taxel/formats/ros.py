@@ -24,7 +24,7 @@ from taxel._base.errors import helped, refused, unreadable
 from taxel._base.messages import counted, first_line, installing, warn
 from taxel._core import Error, FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats.column_names import is_key
+from taxel.formats.column_names import says
 from taxel.formats.times import repaired
 from taxel.frames import Frames
 from taxel.labels import source_of
@@ -494,7 +494,7 @@ def _texts(message: Any, path: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for each in fields(message) if is_dataclass(message) else ():
         value, name = getattr(message, each.name), f"{path}.{each.name}".lstrip(".")
-        if isinstance(value, str) or (isinstance(value, int | np.integer) and is_key(each.name)):
+        if isinstance(value, str) or (isinstance(value, int | np.integer) and says("sensor", each.name)):
             found[name] = value
         elif is_dataclass(value) and not isinstance(value, list):
             found |= _texts(value, name)

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.table_text import Text
-from taxel.formats import column_names
-from taxel.formats.column_names import time_unit
+from taxel.formats.column_names import FORCES, OTHER_UNITS, axes_of, is_time, says, time_unit, unit_of
 from taxel.formats.form import left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
@@ -44,6 +43,7 @@ class Draft:
     fit: Fit
     table: Table
     names: tuple[str, ...]
+    #: Of the columns; none: as their names say.
     units: tuple[str, ...]
     #: What is stated of it.
     layout: Layout
@@ -54,6 +54,7 @@ class Draft:
     size: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
+        self.units = self.units or tuple(map(unit_of, self.names))
         self.roles = [
             Role(name or f"column {k + 1}", self.fit.cells(k)[:FIRST], unit=unit)
             for k, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
@@ -63,6 +64,11 @@ class Draft:
     def left(self) -> dict[int, str]:
         """Why each column is left out that is."""
         return {k: role.why for k, role in enumerate(self.roles) if role.is_left}
+
+    @property
+    def taxels(self) -> list[int]:
+        """The columns of readings."""
+        return [k for k, role in enumerate(self.roles) if role.role == "taxel"]
 
     @cached_property
     def stated_left(self) -> set[int]:
@@ -116,25 +122,27 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     With `by_name` it is one by its name or its cells alone.
     """
     fit, names = draft.fit, draft.names
-    column, others = _stated_time(draft), list[int]()
-    if column is None and not draft.is_stated("time_column"):
+    is_stated, stated, others = draft.is_stated("time_column"), draft.table.time_column, list[int]()
+    places = places_of(names, "time_column", stated) if is_stated and stated else ()
+    draft.be("time", "stated", *places, certainty=SURE)
+    column = next(iter(places), None)
+    if not is_stated:
         column, others = _named_time(draft)
         if column is None and draft.table.frame_time is None and not by_name and fit.kind != "hex":
             column = _unnamed_time(draft)
     if column is None:
         return None
     draft.be("no taxel", "another time", *others)
-    is_two = "+" in str(draft.table.time_column or "") and draft.is_stated("time_column")
     if not draft.is_stated("time_unit"):
         is_text = fit.types[column] == "time"
-        draft.set(time_unit=ISO if is_text else "s" if is_two else _unit_of_time(draft, column))
+        draft.set(time_unit=ISO if is_text else "s" if len(places) > 1 else _unit_of_time(draft, column))
         if is_text and all(map(is_of_two_numbers, fit.cells(column))):
             example = fit.cells(column)[-1]
             why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
             draft.ask(why, "time_unit", {"hours and minutes": {"time_unit": ISO}}, column)
-    if draft.is_stated("time_column"):
+    if is_stated:
         return column
-    is_sure = column_names.is_time(names[column]) and fit.ascends(column)
+    is_sure = is_time(names[column]) and fit.ascends(column)
     draft.be("time", draft.roles[column].why or "named so", column, certainty=SURE if is_sure else LIKELY)
     draft.set(time_column=draft.called(column))
     if _has_milliseconds(fit, column):
@@ -150,14 +158,6 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     return seconds
 
 
-def _stated_time(draft: Draft) -> int | None:
-    """Return the first column of times that the layout states; None if it states none."""
-    stated = draft.table.time_column if draft.is_stated("time_column") else None
-    places = places_of(draft.names, "time_column", stated) if stated else ()
-    draft.be("time", "stated", *places, certainty=SURE)
-    return next(iter(places), None)
-
-
 def _named_time(draft: Draft) -> tuple[int | None, list[int]]:
     """Return the column that is the time by its name or its cells, and others that are times too."""
     fit, names, left = draft.fit, draft.names, draft.stated_left
@@ -166,7 +166,7 @@ def _named_time(draft: Draft) -> tuple[int | None, list[int]]:
         if fit.types[k] not in ("number", "time") or k in left:
             continue
         # A letter may be the name of a taxel too: it is the time where it comes first, or ascends.
-        is_called = column_names.is_time(names[k]) and (k == 0 or len(names[k]) > 1)
+        is_called = is_time(names[k]) and (k == 0 or len(names[k]) > 1)
         if is_called or (time_unit(names[k]) is not None and fit.ascends(k)):
             scores[k] = 3 + is_called + 2 * fit.ascends(k)
         elif fit.types[k] == "time":
@@ -222,7 +222,7 @@ def _unnamed_time(draft: Draft) -> int | None:
     if len(fit.body) < 3 or fit.count < 2:
         return None
     even = [k for k in range(len(names)) if not (k and names[k]) and _rises(fit, k) and _is_even(fit.numbers(k))]
-    even = [k for k in even if not names[k] or (len(fit.body) >= _ASCENDS and not column_names.is_counter(names[k]))]
+    even = [k for k in even if not names[k] or (len(fit.body) >= _ASCENDS and not says("counter", names[k]))]
     even = sorted({*even} - draft.stated_left)
     times = [k for k in even if not fit.counts(k)]
     few = len(fit.body) < _ASCENDS
@@ -262,34 +262,31 @@ def _unit_of_time(draft: Draft, column: int) -> str:
     return unit
 
 
-def taxels_of(draft: Draft, time: int | None) -> list[int]:
-    """Return the columns of readings, and say why the others are none."""
+def find_taxels(draft: Draft) -> None:
+    """Say which columns hold readings, and why the others hold none."""
     fit, names, table = draft.fit, draft.names, draft.table
-    known = {k for k, role in enumerate(draft.roles) if role.role == "time"}
     for key, role in (("label_column", "label"), ("by", "sensor"), ("taxel_column", "taxel's name")):
         stated = getattr(table, key)
         places = places_of(names, key, stated) if stated else ()
         draft.be(role, "stated", *places, certainty=SURE)
-        known |= {*places}
     if draft.is_stated("leave_out", "keep"):
-        others = {*range(len(names))} - known - draft.stated_left
-        taxels = sorted(k for k in others if table.keeps(names[k]))
-        draft.be("taxel", "stated", *taxels, certainty=SURE)
-        draft.be("no taxel", "stated", *({*range(len(names))} - known - {*taxels}), certainty=SURE)
-        return taxels
-    for k in range(len(names)):
-        if k in known or draft.roles[k].is_left:
-            continue
-        role, why = next((each for each in _reasons(draft, k, first=int(time == 0)) if each[1]), ("", ""))
-        if why:
+        others = [k for k, role in enumerate(draft.roles) if role.role in ("taxel", "no taxel")]
+        for k in others:
+            is_taxel = k not in draft.stated_left and table.keeps(names[k])
+            draft.be("taxel" if is_taxel else "no taxel", "stated", k, certainty=SURE)
+        return
+    first = int(draft.roles[0].role == "time")
+    for k in draft.taxels:
+        # Another column may have said what this one is.
+        role, why = next((each for each in _reasons(draft, k, first) if each[1]), ("", ""))
+        if why and not draft.roles[k].is_left:
             draft.be(role, why, k)
-    taxels = [k for k in range(len(names)) if k not in known and not draft.roles[k].is_left]
-    if not taxels:
+    if not draft.taxels:
         # A sensor may have one taxel, and its name be that of a state.
         of_state = ("labels", "another quantity")
-        taxels = [k for k, why in draft.left.items() if fit.types[k] == "number" and why.startswith(of_state)]
-        draft.be("taxel", "", *taxels)
-    return _of_one_unit(draft, taxels)
+        named = (k for k, why in draft.left.items() if fit.types[k] == "number" and why.startswith(of_state))
+        draft.be("taxel", "", *named)
+    _leave_out_other_units(draft)
 
 
 def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]:
@@ -297,7 +294,7 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
     fit, name = draft.fit, draft.names[column]
     kind, cells = fit.types[column], [cell for cell in fit.cells(column) if cell not in MISSING]
     few, reads = len(set(cells)) <= _KEYS, f"; label_column = {draft.called(column)!r} reads them"
-    is_time = time_unit(name) is not None and len(name) > 1
+    of_time = time_unit(name) is not None and len(name) > 1
     if kind == "day":
         yield "no taxel", "a date"
     if kind == "text":
@@ -308,15 +305,15 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
             why = f"decimal {marks[other == ',']} in column {called}, {marks[other == '.']} in others"
             draft.ask(f"{why}; save it with one", "leave_out", alone, column)
             yield "no taxel", "decimal marks that others have not"
-        if not is_time and not few and all(map(_GLUED.match, cells)):
+        if not of_time and not few and all(map(_GLUED.match, cells)):
             draft.ask(f"column {called} has numbers with other text, as {cells[0]!r}", "leave_out", alone, column)
         in_turn = 3 * sum(a != b for a, b in pairwise(cells)) > len(cells)
-        is_whole = len(cells) == len(fit.body) and not column_names.is_label(name)
-        is_key = is_whole and few and (column_names.is_key(name) or (in_turn and len(set(cells)) > 1))
-        yield "no taxel", "times in a form that taxel does not read" * is_time
+        is_whole = len(cells) == len(fit.body) and not says("label", name)
+        is_key = is_whole and few and (says("sensor", name) or (in_turn and len(set(cells)) > 1))
+        yield "no taxel", "times in a form that taxel does not read" * of_time
         yield "sensor", _key(draft, column) if is_key else ""
         yield "label", f"texts{reads * (len(set(cells)) > 1)}"
-    if kind == "time" or is_time or (name and fit.ascends(column) and fit.epoch(column)):
+    if kind == "time" or of_time or (name and fit.ascends(column) and fit.epoch(column)):
         yield "no taxel", "another time"
     numbers = fit.numbers(column)
     whole = bool((numbers[np.isfinite(numbers)] % 1 == 0).all())
@@ -326,15 +323,16 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
     # An index may be a finger.
     few_lines = len(fit.body) < _ASCENDS
     may_count = few_lines or len(set(cells)) == 1 or bool((np.diff(numbers) > 0).mean() >= 0.2)
-    if counts or (column_names.is_counter(name) and whole and may_count):
+    if counts or (says("counter", name) and whole and may_count):
         yield "counter", "a counter"
-    yield "label", f"labels{reads}" * (column_names.is_label(name) and few)
-    if column_names.is_key(name) and whole:
+    yield "label", f"labels{reads}" * (says("label", name) and few)
+    if says("sensor", name) and whole:
         # Lines of one time may be of many taxels.
         is_clock = _rises(fit, column) and _is_even(numbers) and not fit.counts(column)
         repeats = few or 2 * len(set(cells)) <= len(cells)
         yield "sensor", _key(draft, column) if repeats else "" if is_clock else "a counter"
-    yield "no taxel", "another quantity" * column_names.is_other(name, draft.units[column])
+    is_other = says("other", name) or OTHER_UNITS.fullmatch(draft.units[column]) is not None
+    yield "no taxel", "another quantity" * is_other
 
 
 def _key(draft: Draft, column: int) -> str:
@@ -351,16 +349,16 @@ def _key(draft: Draft, column: int) -> str:
     return f"always {next(iter(keys))}" if len(keys) == 1 else "by"
 
 
-def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callable[[], Iterable[str]]) -> list[int]:
-    """Return the columns of readings where another names the taxel or the sensor of each line; if it is open, ask.
+def by_key(draft: Draft, time: int | None, all_lines: Callable[[], Iterable[str]]) -> None:
+    """Say what lines are of which a column names the taxel or the sensor; if it is open, ask.
 
     If each time has one reading of each key, these are the taxels of an array.
     """
-    fit, called = draft.fit, draft.called
+    fit, called, taxels = draft.fit, draft.called, draft.taxels
     grid = _grid(draft, taxels)
     keys = [] if draft.key is None and not grid else grid or [draft.key or 0]
     if not keys or draft.is_stated("by", "taxel_column", "leave_out", "keep"):
-        return taxels
+        return
     values = [k for k in taxels if k not in keys]
     texts = [" ".join(cells) for cells in zip(*map(fit.cells, keys), strict=True)]
     known = sorted(set(texts))
@@ -368,7 +366,7 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
     pairs = len(set(zip(times, texts, strict=False)))
     # The last frame may be a part.
     is_whole = pairs == len(texts) and len(set(times)) * len(known) - pairs < len(known)
-    of_taxels = bool(grid) or column_names.names_taxels(draft.names[keys[0]])
+    of_taxels = bool(grid) or says("taxel", draft.names[keys[0]])
     if len(values) == 1 and len(known) > 1 and is_whole and of_taxels:
         sizes = [len(set(fit.cells(k))) for k in keys]
         draft.size = (sizes[0], sizes[1]) if len(keys) > 1 and sizes[0] * sizes[1] == len(known) else None
@@ -376,9 +374,9 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
         name = "+".join(str(called(k)) for k in keys)
         draft.set(taxel_column=name if len(keys) > 1 else called(keys[0]))
         draft.said.append(f"a taxel for each {name}")
-        return values
+        return
     if grid or (len(known) == 1 and all(known[0] in line or not any(map(str.isdigit, line)) for line in all_lines())):
-        return taxels
+        return
     key = called(keys[0])
     choices: dict[str, Changes] = {f"a source for each: by = {key!r}": {"by": key, "read": [key]}}
     if len(taxels) == 1 and times and (len(known) == 1 or pairs > len(set(times))):
@@ -393,7 +391,6 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
         keys[0],
         first=True,
     )
-    return taxels
 
 
 def _grid(draft: Draft, taxels: Sequence[int]) -> list[int]:
@@ -403,15 +400,14 @@ def _grid(draft: Draft, taxels: Sequence[int]) -> list[int]:
     return next(([by_name[a], by_name[b]] for a, b in pairs if len(taxels) == 3 and {a, b} < set(by_name)), [])
 
 
-def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
-    """Return the columns in the unit that is stated or of most, of a force or pressure if there is one."""
+def _leave_out_other_units(draft: Draft) -> None:
+    """Keep the columns in the unit that is stated or of most, of a force or pressure if there is one."""
+    taxels = draft.taxels
     units = Counter(draft.units[k] for k in taxels if draft.units[k])
-    forces = Counter({unit: count for unit, count in units.items() if column_names.is_force(unit)})
+    forces = Counter({unit: count for unit, count in units.items() if FORCES.fullmatch(unit)})
     (unit, count), *others = (forces or units).most_common() or [("", 0)]
     if draft.layout.unit in units:
         unit, others = draft.layout.unit or "", []
-    if not unit:
-        return taxels
     if others and others[0][1] == count:
         other = others[0][0]
         moved, kept = ([draft.called(k) for k in taxels if draft.units[k] == each] for each in (unit, other))
@@ -420,24 +416,24 @@ def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
     for k in taxels:
         if draft.units[k] not in ("", unit):
             draft.be("no taxel", f"in {draft.units[k]}", k)
-    return [k for k in taxels if not draft.roles[k].is_left]
 
 
-def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> list[int]:
-    """Return the columns of readings without those that hold something else by their values; ask of those that may.
+def by_values(draft: Draft, time: int | None, text: Text) -> None:
+    """Say which columns hold something else than readings by their values; ask of those that may.
 
     The values are those of the first lines and of some over the whole text. A column of a series, whose names differ in
     a number, is one as the others are.
     """
+    taxels = draft.taxels
     stems = [re.sub(r"\d+", "#", name) for name in draft.names]
     counts = Counter(stems[k] for k in taxels)
     series = [k for k in taxels if not draft.names[k] or counts[stems[k]] >= _SERIES]
     alone = [k for k in taxels if draft.fit.types[k] == "number" and k not in {*series}]
     alone += [k for k in series[-1:] if not draft.names[k]]
     alone = alone if len(alone) <= _BLOCKS else []
-    are_axes = column_names.axes_of([draft.names[k] for k in taxels]) is not None
+    are_axes = axes_of([draft.names[k] for k in taxels]) is not None
     if draft.is_stated("leave_out", "keep") or len(taxels) < 3 or are_axes or draft.table.has_lines:
-        return taxels
+        return
     fit = draft.fit.over(text.spread) if alone else draft.fit
     whole = np.column_stack([fit.wide(k) for k in taxels]) if alone else np.empty((0, len(taxels)))
     usual = np.median([len(set(fit.cells(k))) for k in taxels[:: 1 + len(taxels) // 64]])
@@ -473,7 +469,6 @@ def by_values(draft: Draft, time: int | None, taxels: list[int], text: Text) -> 
         choices["they are taxels too"] = {"read": called}
         what = ", ".join(f"{draft.called(k)} ({draft.roles[k].why})" for k in asked[:8])
         draft.ask(f"may be no taxels: {what}", "leave_out keep", choices, *asked)
-    return [k for k in taxels if not draft.roles[k].is_left]
 
 
 def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
@@ -502,12 +497,12 @@ def _is_total(own: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
     return False
 
 
-def are_events(draft: Draft, time: int | None, taxels: Sequence[int]) -> bool:
+def are_events(draft: Draft, time: int | None) -> bool:
     """Return whether lines are events, by the names of the columns; where four have none and may be events, ask.
 
     The rate of events says nothing of the unit of their times, as that of frames does: without a name it is asked.
     """
-    fit, units = draft.fit, ("us", "ms", "s")
+    fit, taxels, units = draft.fit, draft.taxels, ("us", "ms", "s")
     choices: dict[str, Changes]
     called = {EVENT_COLUMNS.get(name, name): k for k in taxels for name in [draft.names[k].lower()]}
     named = [called[name] for name in "xyp" if name in called]

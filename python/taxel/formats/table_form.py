@@ -30,16 +30,14 @@ from taxel.formats.table_columns import (
     ask_for_lines_of_one_time,
     by_key,
     by_values,
+    find_taxels,
     said_of,
-    taxels_of,
     time_of,
 )
 from taxel.formats.times import FEW_ODD, ODD, unit_of_times
 
 #: Two readings fit about equally if one fits this share of the other.
 _EQUALLY = 0.999
-#: What another reading of lines does not leave out.
-_NOTHING_FOUND: Changes = {"time_column": None, "leave_out": []}
 #: A line above a frame: a word and the frame's number, or its time, or both.
 _ABOVE_FRAME = re.compile(
     r"\s*(?P<word>[^\W\d_]+)[ \t:=#.]*(?P<number>\d+(?:[.,]\d+)?)[ \t]*(?P<unit>[mun]?s)?"
@@ -119,21 +117,21 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
     is_laid_out = layout.rows is not None or layout.rate_hz is not None
     if time is None and draft.table.frame_time is None and not is_laid_out:
         _without_times(draft, text)
-    taxels = taxels_of(draft, time)
-    if not taxels:
+    find_taxels(draft)
+    if not draft.taxels:
         raise unreadable("contains no column of readings", text.path)
-    taxels = by_key(draft, time, taxels, text.lines)
+    by_key(draft, time, text.lines)
     if time is not None and draft.table.taxel_column is None:
         ask_for_lines_of_one_time(draft, time)
-    are = are_events(draft, time, taxels)
+    are = are_events(draft, time)
     if not are and draft.table.taxel_column is None:
-        taxels = by_values(draft, time, taxels, text)
+        by_values(draft, time, text)
     if not draft.is_stated("leave_out", "keep"):
         left = (k for k, role in enumerate(draft.roles) if role.is_left and role.certainty != SURE)
         of_taxel = places_of(draft.names, "", draft.table.taxel_column) if draft.table.taxel_column else ()
         draft.set(leave_out=[draft.called(k) for k in left if k not in of_taxel])
     full = replace(layout, table=draft.table)
-    full = full if are else _with_size(full, draft, taxels)
+    full = full if are else _with_size(full, draft)
     unread = [draft.called(k) for k, why in draft.left.items() if why.startswith("times in")]
     if unread and time is None and draft.table.frame_time is None:
         right = "write them as 2024-05-01T10:00:00.25, or state rate_hz and leave_out in a layout file"
@@ -204,7 +202,9 @@ def _decided(draft: Draft, other: Draft) -> Draft:
     first, second = (counted(each.fit.count, "column") for each in (draft, other))
     keys = ("separator", "decimal", "thousands", "skip_lines", "lines")
     ways = {name: {key: getattr(each.table, key) for key in keys} for name, each in ((first, draft), (second, other))}
-    draft.ask(f"{first} or {second}", "separator", {first: ways[first], second: {**ways[second], **_NOTHING_FOUND}})
+    # What was found of one reading is not left out of the other.
+    ways[second] |= {"time_column": None, "leave_out": []}
+    draft.ask(f"{first} or {second}", "separator", ways)
     return draft
 
 
@@ -215,20 +215,16 @@ def draft_of(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
     ------
     FormatError : another number of names is stated
     """
-    draft = _called(fit, lines, layout)
-    stated = layout.table or Table()
+    draft, stated = _called(fit, lines, layout), layout.table or Table()
+    if stated.columns or draft.is_stated("skip_lines"):
+        draft.set(skip_lines=stated.skip_lines)
     if not stated.columns:
-        return draft if not draft.is_stated("skip_lines") else replace(draft, table=_skipping(draft, stated.skip_lines))
+        return draft
     names = tuple(map(str, stated.columns))
     if not len(draft.names) <= len(names) <= fit.count:
         here = f"{counted(len(names), 'name')} for {counted(len(draft.names), 'column')}"
         raise unreadable(here, line=stated.skip_lines + 1)
-    units = tuple(map(column_names.unit_of, names))
-    return replace(draft, table=_skipping(draft, stated.skip_lines), names=names, units=units)
-
-
-def _skipping(draft: Draft, count: int) -> Table:
-    return replace(draft.table, skip_lines=count)
+    return replace(draft, names=names, units=())
 
 
 def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
@@ -244,12 +240,12 @@ def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
         names = own if any(own) else _names_above_marks(fit, lines)
         if not any(own) and any(names):
             table = replace(table, columns=list(names))
-        return Draft(fit, table, names, tuple(map(column_names.unit_of, names)), layout)
+        return Draft(fit, table, names, (), layout)
     real = fit.count
     while real > 1 and fit.types[real - 1] == "empty":
         real -= 1
     head = [(k, row) for k, cells in above[-3:] if (row := _names_in(cells, fit.count, real))]
-    unnamed = Draft(fit, table, ("",) * real, ("",) * real, layout)
+    unnamed = Draft(fit, table, ("",) * real, (), layout)
     if not head or head[-1][0] < above[-1][0]:
         return _numbered(unnamed)
     has_units = len(head) > 1 and column_names.are_units(head[-2][1], head[-1][1])
@@ -261,9 +257,8 @@ def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
     named = [name for name in names if name]
     if len(set(named)) < len(named) and len(head) > 1 and any(head[-2][1]):
         names = tuple(_below(head[-2][1], names))
-        units = tuple(map(column_names.unit_of, names))
-        return Draft(fit, replace(table, columns=list(names)), names, units, layout)
-    stripped = tuple(unit.strip("[]()") for unit in units[: len(names)]) or tuple(map(column_names.unit_of, names))
+        return Draft(fit, replace(table, columns=list(names)), names, (), layout)
+    stripped = tuple(unit.strip("[]()") for unit in units[: len(names)])
     return Draft(fit, replace(table, skip_lines=at_names), names, stripped, layout)
 
 
@@ -421,8 +416,9 @@ def _without_times(draft: Draft, text: Text) -> None:
     draft.ask(f"{counted(count, 'line')}, no times", keys, choices)
 
 
-def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
+def _with_size(layout: Layout, draft: Draft) -> Layout:
     """Return the layout with its unit, its axes (which are asked), and rows and columns that the names state."""
+    taxels = draft.taxels
     unit = next((draft.units[k] for k in taxels if draft.units[k]), "")
     full = replace(layout, unit=layout.unit or unit or None)
     names = [draft.names[k] for k in taxels]
