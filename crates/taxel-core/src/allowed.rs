@@ -198,7 +198,7 @@ macro_rules! ranges {
             $($crate::allowed::Parameter { name: stringify!($name), unit: $unit, range: $range },)*
         ];
 
-        fn check_ranges(&self) -> $crate::Result<()> {
+        pub(crate) fn check_ranges(&self) -> $crate::Result<()> {
             let mut ranges = Self::RANGES.iter();
             $(if let Some(parameter) = ranges.next() {
                 parameter.check(&$crate::allowed::ranges!(@ self $name $($method)?))?;

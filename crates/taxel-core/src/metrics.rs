@@ -87,8 +87,8 @@ impl Metric {
     /// `Problem`, naming the parameter.
     pub fn check(&self) -> Result<()> {
         match self {
-            Self::VictorPurpura(metric) => metric.check(),
-            Self::VanRossum(metric) => metric.check(),
+            Self::VictorPurpura(metric) => metric.check_ranges(),
+            Self::VanRossum(metric) => metric.check_ranges(),
             Self::VanRossumSpatial(metric) => metric.check(),
         }
     }
@@ -111,6 +111,7 @@ impl Metric {
         let two = Two::new(a, b);
         let between = self.prepare(&two)?;
         let mut distances = work.run(two.pairs(), |running| match self {
+            Self::VictorPurpura(metric) if metric.q > 0.0 => metric.matrix(&two, running),
             Self::VanRossum(metric) => metric.matrix(&two, running),
             _ => pair_by_pair(&between, &two, running),
         })?;

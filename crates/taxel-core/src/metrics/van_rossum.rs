@@ -64,10 +64,6 @@ impl VanRossum {
         Described::by(&Self { tau: 1.0, normalisation: Normalisation::default() }, &["tau"], Self::RANGES)
     }
 
-    pub(super) fn check(&self) -> Result<()> {
-        self.check_ranges()
-    }
-
     /// The distance between two ascending trains.
     pub(super) fn between(&self, a: &[f64], b: &[f64]) -> f64 {
         self.normalisation.root(self.square(a, b), self.tau)

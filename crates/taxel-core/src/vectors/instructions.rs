@@ -111,15 +111,15 @@ impl Instructions {
 
 /// Dispatches on a set of [`Instructions`] to a variant compiled for AVX-512, for AVX2 or without vector instructions.
 macro_rules! by_width {
-    ($set:expr, ($($argument:ident: $kind:ty),*) -> $out:ty, [$($generic:tt)*], $avx512:expr, $avx2:expr, $plain:expr) => {{
+    ($set:expr, ($($argument:ident: $kind:ty),*) $(-> $out:ty)?, [$($generic:tt)*], $avx512:expr, $avx2:expr, $plain:expr) => {{
         #[cfg(target_arch = "x86_64")]
         {
             #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,popcnt")]
-            fn avx512 $($generic)* ($($argument: $kind),*) -> $out {
+            fn avx512 $($generic)* ($($argument: $kind),*) $(-> $out)? {
                 $avx512($($argument),*)
             }
             #[target_feature(enable = "avx2,fma,bmi1,popcnt")]
-            fn avx2 $($generic)* ($($argument: $kind),*) -> $out {
+            fn avx2 $($generic)* ($($argument: $kind),*) $(-> $out)? {
                 $avx2($($argument),*)
             }
             let set: $crate::vectors::Instructions = $set;
@@ -148,21 +148,15 @@ macro_rules! by_width {
 macro_rules! wide {
     (
         $(#[$about:meta])*
-        fn $name:ident $(<$rule:ident: $bound:ident>)? ($($argument:ident: $kind:ty),* $(,)?) $body:block
-    ) => {
-        $crate::vectors::wide! { $(#[$about])* fn $name $(<$rule: $bound>)? ($($argument: $kind),*) -> () $body }
-    };
-    (
-        $(#[$about:meta])*
-        fn $name:ident $(<$rule:ident: $bound:ident>)? ($($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
+        fn $name:ident $(<$rule:ident: $bound:ident>)? ($($argument:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block
     ) => {
         $(#[$about])*
-        fn $name $(<$rule: $bound>)? ($($argument: $kind),*) -> $out {
+        fn $name $(<$rule: $bound>)? ($($argument: $kind),*) $(-> $out)? {
             #[inline(always)]
-            fn plain $(<$rule: $bound>)? ($($argument: $kind),*) -> $out $body
+            fn plain $(<$rule: $bound>)? ($($argument: $kind),*) $(-> $out)? $body
             $crate::vectors::by_width!(
                 $crate::vectors::Instructions::best(),
-                ($($argument: $kind),*) -> $out, [$(<$rule: $bound>)?], plain, plain, plain
+                ($($argument: $kind),*) $(-> $out)?, [$(<$rule: $bound>)?], plain, plain, plain
             )
         }
     };
@@ -172,20 +166,14 @@ macro_rules! wide {
 macro_rules! kernel {
     (
         $(#[$about:meta])*
-        $visible:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) $body:block
-    ) => {
-        $crate::vectors::kernel! { $(#[$about])* $visible fn $name<$vector>($($argument: $kind),*) -> () $body }
-    };
-    (
-        $(#[$about:meta])*
-        $visible:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
+        $visible:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block
     ) => {
         $(#[$about])*
-        $visible fn $name($($argument: $kind),*) -> $out {
+        $visible fn $name($($argument: $kind),*) $(-> $out)? {
             #[inline(always)]
-            fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) -> $out $body
+            fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) $(-> $out)? $body
             $crate::vectors::by_width!(
-                $crate::vectors::Instructions::best(), ($($argument: $kind),*) -> $out, [],
+                $crate::vectors::Instructions::best(), ($($argument: $kind),*) $(-> $out)?, [],
                 plain::<$crate::vectors::Zmm>, plain::<$crate::vectors::Ymm>, plain::<[f64; $crate::vectors::LANES]>
             )
         }

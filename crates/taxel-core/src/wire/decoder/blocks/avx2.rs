@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::carried::{Carried, indices, value};
+use super::carried::{Carried, indices};
 use crate::vectors::TO_FRONT;
 use crate::wire::columns::Columns;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
@@ -167,7 +167,7 @@ pub(super) unsafe fn blocks(
             // The stamps do not fall, so each is ahead of the latest time if it is ahead of the stamp before it.
             let before = shift_lane_up(zero, ahead);
             let rising = low_bits(_mm256_cmpeq_epi16(_mm256_max_epu16(ahead, before), ahead)) == u32::MAX;
-            farthest = value(bytes, at + WORD_BYTES * (WORDS - 1)).wrapping_sub(base);
+            farthest = (_mm256_extract_epi16::<15>(values) as u16).wrapping_sub(base);
             if !rising || farthest > state.largest_lead() {
                 break;
             }
@@ -199,7 +199,7 @@ pub(super) unsafe fn blocks(
             let ahead = changes(ahead);
             let before = _mm_slli_si128::<2>(ahead);
             let rising = _mm_movemask_epi8(_mm_cmpeq_epi16(_mm_max_epu16(ahead, before), ahead)) == 0xffff;
-            farthest = value(bytes, at + WORD_BYTES * (WORDS - 2)).wrapping_sub(base);
+            farthest = (_mm256_extract_epi16::<14>(values) as u16).wrapping_sub(base);
             if !rising || farthest > state.largest_lead() {
                 break;
             }
