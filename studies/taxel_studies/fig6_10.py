@@ -46,7 +46,7 @@ summarise = waves.summarise
 def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.7 says, in each reading of B."""
     for divisor in p["readings"]:
-        curves, reading = summary["curves"][divisor], READINGS[divisor]
+        curves, reading = summary["curves"][divisor], READINGS[divisor].name
         clean = curves["clean"]
         claims = (
             (82, "jitter", True, ANY),
@@ -109,7 +109,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     figure = Figure(figsize=(7.5 * len(p["readings"]), 8.5), layout="constrained")
     parts = figure.subfigures(1, len(p["readings"]), squeeze=False)[0]
     for part, reading in zip(parts, p["readings"], strict=True):
-        part.suptitle(READINGS[reading])
+        part.suptitle(READINGS[reading].name)
         axes = part.subplots(len(p["levels"]), 2, squeeze=False)
         for row, noise in enumerate(p["levels"]):
             for column, training in enumerate(("clean", "noisy")):

@@ -24,7 +24,7 @@ PARAMETERS: dict[str, Any] = {
     "realisations": 100,
     "kappa": 1.04,
     "lambdas": [2.0, 2.0, 100.0, 100.0, 100.0],
-    "readings": list(READINGS),
+    "readings": ["targets", "B_max"],
     "trainings": ["clean", "jitter", "background", "shunting"],
     "bin_mv": 0.001,
     "repetitions": waves.REPETITIONS,
@@ -107,7 +107,7 @@ def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
                 behind = shares[centres > 0.5 * p["bin_mv"]]
                 back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
                 ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
-            yield Judgement(CLAIM_OF[training], ours, holds, reading=READINGS[divisor])
+            yield Judgement(CLAIM_OF[training], ours, holds, reading=READINGS[divisor].name)
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
@@ -116,7 +116,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         5 * len(p["readings"]), 8, len(p["trainings"]), len(p["readings"]), sharex=True, squeeze=False
     )
     for column, reading in enumerate(p["readings"]):
-        axes[0, column].set_title(READINGS[reading])
+        axes[0, column].set_title(READINGS[reading].name)
         for row, training in enumerate(p["trainings"]):
             shares = 100 * np.array(summary["shares"][reading][training])
             edges = np.append(

@@ -50,7 +50,7 @@ summarise = waves.summarise
 def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
     for divisor in p["readings"]:
-        curves, reading = summary["curves"][divisor], READINGS[divisor]
+        curves, reading = summary["curves"][divisor], READINGS[divisor].name
         for training, claims in CLAIMS_OF.items():
             here = curves[training]
             for claim, noise in zip(claims, ("jitter", "shunting"), strict=False):
@@ -115,7 +115,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     figure = Figure(figsize=(12, 10 * len(readings)), layout="constrained")
     parts = figure.subfigures(len(readings), 1, squeeze=False)[:, 0]
     for part, reading in zip(parts, readings, strict=True):
-        part.suptitle(READINGS[reading])
+        part.suptitle(READINGS[reading].name)
         axes = part.subplots(3, len(p["levels"]), squeeze=False)
         for column, noise in enumerate(p["levels"]):
             _column(axes[:, column], summary["curves"][reading], noise, p)
