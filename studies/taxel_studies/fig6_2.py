@@ -29,7 +29,7 @@ PARAMETERS: dict[str, Any] = {
     "target": 100.0,
     "kappas": [1.0, 1.2],
     "lambdas": [0.0, 2.0, 100.0],
-    "readings": list(READINGS),
+    "readings": ["sum", "targets", "B_max"],
     "after_spike": "reset",
     "drawn": [85.0, 112.0],
     "step_ms": 0.05,

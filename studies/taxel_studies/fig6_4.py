@@ -28,7 +28,7 @@ PARAMETERS: dict[str, Any] = {
     "target": 100.0,
     "kappas": [1.0, 1.05, 1.1, 1.2, 1.3],
     "lambdas": [0.0, 2.0, 100.0],
-    "readings": list(READINGS),
+    "readings": ["sum", "targets", "B_max"],
     "after_spike": "reset",
     "time": "continuous",
     "drawn_to": 130.0,

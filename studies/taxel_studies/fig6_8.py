@@ -20,7 +20,7 @@ from taxel_studies.study import Judgement, Parameters, Summary, one_task, only_r
 WHERE = "thesis 6.4.5, figure 6.8"
 PROTOCOL = (
     "The first repetitions and some of the 200 inputs are drawn; the neuron was trained by CONE-X on the clean "
-    "pattern, kappa 1.16, B as a sum. " + waves.PROTOCOL
+    "pattern, kappa 1.16, B as a sum, delta t 1.5 ms. " + waves.PROTOCOL
 )
 
 PARAMETERS: dict[str, Any] = {
