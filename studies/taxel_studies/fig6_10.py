@@ -13,7 +13,11 @@ from taxel_studies.study import Judgement, Parameters, Summary, Task
 from taxel_studies.waves import NOISES, READINGS, TRAINED_AT
 
 WHERE = "thesis 6.4.7, figure 6.10"
-PROTOCOL = waves.PROTOCOL + " CONE-R in both trainings, kappa 1.08, lambda 3 to 5 at 100, lambda 1 : lambda 2 varied."
+PROTOCOL = (
+    waves.PROTOCOL
+    + waves.READ
+    + " CONE-R in both trainings, kappa 1.08, lambda 3 to 5 at 100, lambda 1 : lambda 2 varied."
+)
 
 PARAMETERS: dict[str, Any] = {
     **waves.TESTED,
@@ -45,32 +49,33 @@ summarise = waves.summarise
 
 def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    for divisor in p["readings"]:
-        curves, reading = summary["curves"][divisor], READINGS[divisor]
-        clean = curves["clean"]
-        claims = (
-            (82, "jitter", True, ANY),
-            (83, "background", False, ANY),
-            (84, "shunting", True, WEAK),
-            (85, "shunting", False, STRONG),
-        )
-        yield from (
-            _compared(claim, clean[noise], UNITS[noise], dense_is_better, levels, reading)
-            for claim, noise, dense_is_better, levels in claims
-            if noise in clean
-        )
-        spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
-        yield Judgement(
-            86,
-            "largest less smallest distance between ratios, mean over levels and noises: "
-            f"{spread['clean']:.2f} noise-free, {spread['noisy']:.2f} noisy",
-            spread["noisy"] < spread["clean"],
-            reading=reading,
-        )
+    return waves.agreed(p["readings"], lambda reading: _judged(summary["curves"][reading]))
+
+
+def _judged(curves: dict[str, Any]) -> Iterator[Judgement]:
+    clean = curves["clean"]
+    claims = (
+        (82, "jitter", True, ANY),
+        (83, "background", False, ANY),
+        (84, "shunting", True, WEAK),
+        (85, "shunting", False, STRONG),
+    )
+    yield from (
+        _compared(claim, clean[noise], UNITS[noise], dense_is_better, levels)
+        for claim, noise, dense_is_better, levels in claims
+        if noise in clean
+    )
+    spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
+    yield Judgement(
+        86,
+        "largest less smallest distance between ratios, mean over levels and noises: "
+        f"{spread['clean']:.2f} noise-free, {spread['noisy']:.2f} noisy",
+        spread["noisy"] < spread["clean"],
+    )
 
 
 def _compared(
-    claim: int, curve: dict[str, Any], unit: str, dense_is_better: bool, among: tuple[float, float], reading: str
+    claim: int, curve: dict[str, Any], unit: str, dense_is_better: bool, among: tuple[float, float]
 ) -> Judgement:
     levels, mean = np.array(curve["levels"], float), np.array(curve["mean"])
     dense, sparse = mean[0], mean[-1]
@@ -91,7 +96,6 @@ def _compared(
         f"mean distance at {over} {unit}: {means[0]:.2f} dense (0 : 4), {means[1]:.2f} sparse (4 : 0){crossing}",
         holds,
         f"it does below {turns[0]:.1f} {unit}, and above it the other way round" if turned else "",
-        reading,
     )
 
 
@@ -109,7 +113,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     figure = Figure(figsize=(7.5 * len(p["readings"]), 8.5), layout="constrained")
     parts = figure.subfigures(1, len(p["readings"]), squeeze=False)[0]
     for part, reading in zip(parts, p["readings"], strict=True):
-        part.suptitle(READINGS[reading])
+        part.suptitle(READINGS[reading].title)
         axes = part.subplots(len(p["levels"]), 2, squeeze=False)
         for row, noise in enumerate(p["levels"]):
             for column, training in enumerate(("clean", "noisy")):

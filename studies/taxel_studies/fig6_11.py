@@ -17,7 +17,9 @@ from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.7, figure 6.11"
 PROTOCOL = (
-    waves.PROTOCOL + " Here only the weights: CONE-R, kappa 1.04, lambda (2, 2, 100, 100, 100), mean of the trials."
+    waves.PROTOCOL
+    + waves.READ
+    + " Here only the weights: CONE-R, kappa 1.04, lambda (2, 2, 100, 100, 100), mean of the trials."
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -48,7 +50,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         "training": params["training"],
         "learner": "cone_r",
         "settings": [{"kappa": params["kappa"], "lambdas": params["lambdas"]}],
-        "divide_b_by": params["reading"],
+        "reading": params["reading"],
         "levels": {params["training"]: []} if params["training"] != "clean" else {},
         "repetitions": params["repetitions"],
     }
@@ -95,19 +97,22 @@ def modes(shares: NDArray[np.float64]) -> list[int]:
 
 def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.7 says, in each reading of B."""
+    return waves.agreed(p["readings"], lambda reading: _judged(p, summary, reading))
+
+
+def _judged(p: Parameters, summary: Summary, reading: str) -> Iterator[Judgement]:
     centres = np.array(summary["centres"])
-    for divisor in p["readings"]:
-        for training in p["trainings"]:
-            shares = np.array(summary["shares"][divisor][training])
-            where = [float(centres[k]) for k in modes(shares)]
-            ours = "modes at " + ", ".join(f"{w:.3f}" for w in where) + " mV"
-            holds = len(where) > 1
-            if training != "clean":
-                holds = len(where) == 1 and abs(where[0]) <= p["bin_mv"]
-                behind = shares[centres > 0.5 * p["bin_mv"]]
-                back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
-                ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
-            yield Judgement(CLAIM_OF[training], ours, holds, reading=READINGS[divisor])
+    for training in p["trainings"]:
+        shares = np.array(summary["shares"][reading][training])
+        where = [float(centres[k]) for k in modes(shares)]
+        ours = "modes at " + ", ".join(f"{w:.3f}" for w in where) + " mV"
+        holds = len(where) > 1
+        if training != "clean":
+            holds = len(where) == 1 and abs(where[0]) <= p["bin_mv"]
+            behind = shares[centres > 0.5 * p["bin_mv"]]
+            back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
+            ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
+        yield Judgement(CLAIM_OF[training], ours, holds)
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
@@ -116,7 +121,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         5 * len(p["readings"]), 8, len(p["trainings"]), len(p["readings"]), sharex=True, squeeze=False
     )
     for column, reading in enumerate(p["readings"]):
-        axes[0, column].set_title(READINGS[reading])
+        axes[0, column].set_title(READINGS[reading].title)
         for row, training in enumerate(p["trainings"]):
             shares = 100 * np.array(summary["shares"][reading][training])
             edges = np.append(

@@ -17,7 +17,7 @@ from taxel_studies.waves import READINGS
 WHERE = "thesis 6.4.1, figure 6.4"
 PROTOCOL = (
     "100 inputs with one spike each, uniform on 0 to 100 ms, one target at 100 ms; Table 6.1, CONE-X in continuous "
-    "time, lambda (0, 2, 100), kappa varied, in both readings of B. The first pattern is drawn; claims are judged "
+    "time, lambda (0, 2, 100), kappa varied, in three readings of B. The first pattern is drawn; claims are judged "
     "over all of them."
 )
 
@@ -28,8 +28,8 @@ PARAMETERS: dict[str, Any] = {
     "target": 100.0,
     "kappas": [1.0, 1.05, 1.1, 1.2, 1.3],
     "lambdas": [0.0, 2.0, 100.0],
-    "readings": ["targets", "B_max"],
-    "after_spike": "keep",
+    "readings": ["sum", "targets", "B_max"],
+    "after_spike": "reset",
     "time": "continuous",
     "drawn_to": 130.0,
 }
@@ -51,7 +51,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Fit one pattern."""
     times = _times(params)
     trains = mapping.single_spikes(seed, params["inputs"], params["stop"], max(times))
-    learn = {"divide_b_by": params["reading"], "kappa": params["kappa"], "lambdas": params["lambdas"]}
+    learn = {**READINGS[params["reading"]].options, "kappa": params["kappa"], "lambdas": params["lambdas"]}
     neuron = {"neuron__after_spike": params["after_spike"], "neuron__time": params["time"]}
     return mapping.fitted(trains, [params["target"]], times, **learn, **neuron)
 
@@ -89,16 +89,16 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.1 says."""
-    for divisor, all_ in summary["readings"].items():
+    for name, all_ in summary["readings"].items():
         behind = [c["behind"] for c in all_]
         weights = [c["near_weight"] for c in all_]
-        reading = f"{READINGS[divisor]}, after a spike “{p['after_spike']}”"
+        reading = f"{READINGS[name].name}, after a spike “{p['after_spike']}”"
         yield Judgement(56, *mapping.exactness(all_), reading=reading)
         yield Judgement(
             57,
             f"U({p['target'] + DELTA_T:g} ms) in thresholds: " + listed(behind, p["kappas"], ".3f"),
             None not in behind and bool(np.all(np.diff(behind) > 0)),
-            "" if divisor == "targets" else "it does, but by less than kappa asks for",
+            "it does, but by less than kappa asks for" if name == "B_max" else "",
             reading,
         )
         yield Judgement(
@@ -120,7 +120,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
             right.plot(c["at"], c["weights"], ".", ms=5, label=f"{c['kappa']:g}")
         left.axhline(TABLE["theta_0"], color="k", ls="--", lw=0.8)
         left.axvline(p["target"], color="0.6", lw=0.8)
-        left.set(xlabel="time, ms", ylabel="potential without spiking, mV", title=READINGS[reading])
+        left.set(xlabel="time, ms", ylabel="potential without spiking, mV", title=READINGS[reading].name)
         left.legend(title="kappa", fontsize="small")
         right.set(xlabel="spike time of the synapse, ms", ylabel="weight, mV", title=weighed)
     return figure

@@ -20,7 +20,7 @@ from taxel_studies.study import Judgement, Parameters, Summary, one_task, only_r
 WHERE = "thesis 6.4.5, figure 6.8"
 PROTOCOL = (
     "The first repetitions and some of the 200 inputs are drawn; the neuron was trained by CONE-X on the clean "
-    "pattern, kappa 1.16. " + waves.PROTOCOL
+    "pattern, kappa 1.16, B as a sum, delta t 1.5 ms. " + waves.PROTOCOL
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -51,7 +51,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Train a neuron on the clean pattern and run it under each noise."""
     times = waves.pattern(seed)
     learnt = {name: params[name] for name in ("kappa", "lambdas")}
-    cone = ConeX(neuron=Neuron(**waves.NEURON), **LEARN, **learnt, divide_b_by="targets")
+    cone = ConeX(neuron=Neuron(**waves.NEURON), **LEARN, **learnt, **waves.READINGS["sum"].options)
     noted(cone.fit([SpikeTrains.from_lists([[t] for t in times], 0.0, waves.DURATION_MS)], [[waves.DURATION_MS]]))
     train = waves.waves(times, np.random.default_rng([seed, 3]), params["repetitions"])
     clean = train.trains
@@ -118,7 +118,7 @@ def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
         f"distance over {len(summary['targets'])} targets: {summary['clean_distance']:.2f} without noise, {listed}",
         worst < ROBUST * len(summary["targets"]),
         f"kappa {p['kappa']:g}; robust: below {ROBUST:.0%} of silence",
-        waves.READINGS["targets"],
+        waves.READINGS["sum"].name,
     )
 
 

@@ -15,6 +15,7 @@ from taxel_studies.waves import NOISES, READINGS
 WHERE = "thesis 6.4.5 and 6.4.6, figure 6.9"
 PROTOCOL = (
     waves.PROTOCOL
+    + waves.READ
     + " Noise-free training: CONE-X in continuous time, lambda (2, 2, 200); noisy: CONE-R, (2, 2, 100, 100, 100)."
 )
 
@@ -49,25 +50,27 @@ summarise = waves.summarise
 
 def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
-    for divisor in p["readings"]:
-        curves, reading = summary["curves"][divisor], READINGS[divisor]
-        for training, claims in CLAIMS_OF.items():
-            here = curves[training]
-            for claim, noise in zip(claims, ("jitter", "shunting"), strict=False):
-                if noise in here:
-                    yield _larger_is_better(p, here[noise], claim, reading)
-            if "background" in here:
-                yield from _turn(p, here["background"], claims[2:], reading)
-        yield _training_helps(p, curves, reading)
+    return waves.agreed(p["readings"], lambda reading: _judged(p, summary["curves"][reading]))
 
 
-def _larger_is_better(p: Parameters, curve: dict[str, Any], claim: int, reading: str) -> Judgement:
+def _judged(p: Parameters, curves: dict[str, Any]) -> Iterator[Judgement]:
+    for training, claims in CLAIMS_OF.items():
+        here = curves[training]
+        for claim, noise in zip(claims, ("jitter", "shunting"), strict=False):
+            if noise in here:
+                yield _larger_is_better(p, here[noise], claim)
+        if "background" in here:
+            yield from _turn(p, here["background"], claims[2:])
+    yield _training_helps(p, curves)
+
+
+def _larger_is_better(p: Parameters, curve: dict[str, Any], claim: int) -> Judgement:
     mean = np.array(curve["mean"])[:, [k for k, level in enumerate(curve["levels"]) if level]].mean(axis=1)
     holds = bool(mean[-1] < mean[0] - SAME * p["repetitions"] and np.all(np.diff(mean) < SAME * p["repetitions"]))
-    return Judgement(claim, "distance, mean over levels: " + listed(mean, p["kappas"], ".1f"), holds, reading=reading)
+    return Judgement(claim, "distance, mean over levels: " + listed(mean, p["kappas"], ".1f"), holds)
 
 
-def _turn(p: Parameters, curve: dict[str, Any], claims: tuple[int, ...], reading: str) -> Iterator[Judgement]:
+def _turn(p: Parameters, curve: dict[str, Any], claims: tuple[int, ...]) -> Iterator[Judgement]:
     mean, levels = np.array(curve["mean"]), np.array(curve["levels"], float)
     gain = mean[0] - mean[-1]
     low, high = (levels > 0) & (levels < 15), levels > 15
@@ -81,17 +84,15 @@ def _turn(p: Parameters, curve: dict[str, Any], claims: tuple[int, ...], reading
         claims[0],
         "distance, mean below 15 Hz: " + listed(mean[:, low].mean(axis=1), p["kappas"], ".1f"),
         bool(gain[low].mean() > SAME * p["repetitions"]),
-        reading=reading,
     )
     yield Judgement(
         claims[1],
         "distance, mean above 15 Hz: " + listed(mean[:, high].mean(axis=1), p["kappas"], ".1f") + turn,
         bool(gain[high].mean() < -SAME * p["repetitions"]),
-        reading=reading,
     )
 
 
-def _training_helps(p: Parameters, curves: dict[str, Any], reading: str) -> Judgement:
+def _training_helps(p: Parameters, curves: dict[str, Any]) -> Judgement:
     parts, holds = [], True
     for noise, noisy in curves["noisy"].items():
         clean = curves["clean"][noise]
@@ -105,7 +106,6 @@ def _training_helps(p: Parameters, curves: dict[str, Any], reading: str) -> Judg
         "% less distance, mean over levels: " + "; ".join(parts),
         holds,
         "judged for kappa > 1, as 6.10 has it",
-        reading,
     )
 
 
@@ -115,7 +115,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     figure = Figure(figsize=(12, 10 * len(readings)), layout="constrained")
     parts = figure.subfigures(len(readings), 1, squeeze=False)[:, 0]
     for part, reading in zip(parts, readings, strict=True):
-        part.suptitle(READINGS[reading])
+        part.suptitle(READINGS[reading].title)
         axes = part.subplots(3, len(p["levels"]), squeeze=False)
         for column, noise in enumerate(p["levels"]):
             _column(axes[:, column], summary["curves"][reading], noise, p)

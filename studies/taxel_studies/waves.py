@@ -7,7 +7,7 @@ Every draw comes from its own seed, so all thresholds, lambdas and learners are 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN
 from taxel_studies.runner import noted
-from taxel_studies.study import Row, Task
+from taxel_studies.study import Judgement, Row, Task
 
 INPUTS, DURATION_MS, REPETITIONS = 200, 40.0, 30
 #: Between repetitions, ms; the first and the last have a gap outside too, so that jitter stays inside.
@@ -39,8 +39,31 @@ LEVELS: dict[str, tuple[float, ...]] = {
 #: Level of the noise in noisy training.
 TRAINED_AT = 3.0
 
-#: What B is divided by.
-READINGS = {"targets": "B over the number of targets", "B_max": "B over B_max, as printed"}
+
+@dataclass(frozen=True)
+class Reading:
+    """A reading of B: its name in claims, and what the learner is given."""
+
+    name: str
+    options: Mapping[str, Any]
+
+    @property
+    def title(self) -> str:
+        """Its name, and delta t."""
+        return f"{self.name}, {self.delta_t}"
+
+    @property
+    def delta_t(self) -> str:
+        """Delta t, in words."""
+        return f"delta t {self.options.get('delta_t_ms', LEARN['delta_t_ms']):g} ms"
+
+
+READINGS = {
+    "sum": Reading("B as a sum", {"form_b": "sum"}),
+    "sum, 0.1 tau": Reading("B as a sum", {"form_b": "sum", "delta_t_ms": 0.1 * NEURON["tau"]}),
+    "targets": Reading("B over the number of targets", {"divide_b_by": "targets"}),
+    "B_max": Reading("B over B_max, as printed", {}),
+}
 
 #: Parameters of studies that train and then test under all noises (6.9, 6.10); the same at a size that takes seconds.
 TESTED: dict[str, Any] = {
@@ -56,13 +79,16 @@ TESTED_TOY: dict[str, Any] = {
 }
 
 PROTOCOL = (
-    "200 inputs with one spike each, uniform on 0 to 40 ms, target at 40 ms; tau 10 ms, theta+ 0, delta t 1.5 ms, "
+    "200 inputs with one spike each, uniform on 0 to 40 ms, target at 40 ms; tau 10 ms, theta+ 0, "
     "bounds ±0.3 mV. Tested on 30 repetitions 50 to 100 ms apart with jitter (normal, sd in ms), background (Poisson, "
     "Hz an input) or shunting (% of the spikes, drawn without replacement). Distance of Victor and Purpura with q = "
     "0.05 a ms over the 30 targets: 30 is as bad as silence. Noisy training: a wave train of 30 repetitions with noise "
     "3 of the same kind, CONE-R. Tested in continuous time. After a spike “reset”, in rows and neuron: with “keep”, as "
-    "6.7 prints it, the neuron fires again each 3 ms. In both readings of B: over the number of targets, and over "
-    "B_max as printed."
+    "6.7 prints it, the neuron fires again each 3 ms."
+)
+READ = (
+    " Readings of B: as a sum, at a delta t of 1.5 ms (Table 6.1) and of 1 ms (0.1 tau), as no line decides: "
+    "a claim holds if it does at both; over the number of targets, and over B_max as printed, at 1.5 ms."
 )
 
 
@@ -146,7 +172,7 @@ def tasks(
                 "training": training,
                 "learner": learner if training == "clean" else "cone_r",
                 "settings": [dict(setting) for setting in (clean if training == "clean" else noisy)],
-                "divide_b_by": reading,
+                "reading": reading,
                 "levels": tested if training == "clean" else {training: tested[training]},
                 "repetitions": p["repetitions"],
             }
@@ -167,7 +193,7 @@ def summarise(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
     for reading in p["readings"]:
         averages[reading] = {"clean": {}, "noisy": {}}
         for training in ("clean", *p["levels"]):
-            here = [r for r in rows if r.params["divide_b_by"] == reading and r.params["training"] == training]
+            here = [r for r in rows if r.params["reading"] == reading and r.params["training"] == training]
             for noise, levels in here[0].params["levels"].items():
                 each = np.array([[f["distance"][noise] for f in r.result["found"]] for r in here])
                 averages[reading]["clean" if training == "clean" else "noisy"][noise] = {
@@ -178,9 +204,25 @@ def summarise(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
     return {"curves": averages}
 
 
-def why(reading: str) -> str:
-    """Name the reading of B under which a statement was judged."""
-    return READINGS[reading] + (", which leaves kappa nearly powerless" if reading == "B_max" else "")
+def agreed(readings: Sequence[str], judged: Callable[[str], Iterable[Judgement]]) -> Iterator[Judgement]:
+    """Judge in each reading of B: a claim at several delta t once, and it holds if it does at all of them."""
+    found: dict[tuple[int, str], dict[str, Judgement]] = {}
+    for reading in readings:
+        for one in judged(reading):
+            found.setdefault((one.claim, READINGS[reading].name), {})[READINGS[reading].delta_t] = one
+    for (claim, name), at in found.items():
+        ours = _each({delta_t: one.ours for delta_t, one in at.items()})
+        held = [delta_t for delta_t, one in at.items() if one.holds]
+        why = _each({delta_t: one.why for delta_t, one in at.items()})
+        if 0 < len(held) < len(at) and not why:
+            why = f"it does at {', '.join(held)} alone"
+        yield Judgement(claim, ours, len(held) == len(at), why, name)
+
+
+def _each(texts: Mapping[str, str]) -> str:
+    if len(set(texts.values())) == 1:
+        return next(iter(texts.values()))
+    return "; ".join(f"{delta_t}: {text}" for delta_t, text in texts.items() if text)
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -190,7 +232,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     ----------
     params : dict
         ``training`` ("clean" or the noise of the training), ``learner`` ("cone_x" or "cone_r"), ``settings`` (dicts
-        with kappa and lambdas), ``divide_b_by``, ``levels`` by noise, ``repetitions``.
+        with kappa and lambdas), ``reading``, ``levels`` by noise, ``repetitions``.
     seed : int
         Of the pattern and everything drawn on it.
 
@@ -248,7 +290,7 @@ def _fitted(
     patterns: Sequence[SpikeTrains],
     targets: Sequence[NDArray[np.float64]],
 ) -> learn.ConeR | learn.ConeX:
-    options = {**LEARN, **setting, "divide_b_by": params["divide_b_by"]}
+    options = {**LEARN, **setting, **READINGS[params["reading"]].options}
     with warnings.catch_warnings():
         # Noise may well take a target out of reach; the distance shows it.
         warnings.simplefilter("ignore", UserWarning)
