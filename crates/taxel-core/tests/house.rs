@@ -32,7 +32,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-live",
         &[
-            &["error", "kernel_drops", "latency", "locked", "read_at", "system_error"],
+            &["error", "host_clock", "kernel_drops", "latency", "locked", "read_at", "system_error"],
             &["clock", "named_pipe"],
             &["address", "ports"],
             &["serial_line"],
