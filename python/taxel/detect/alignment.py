@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
-from taxel._core import ProblemError, Tally
+from taxel._core import ProblemError
 from taxel.detect.ages import Ages, onsets
-from taxel.detect.scoring import APART_US, tally
+from taxel.detect.scoring import APART_US, Tally, tally
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: How far from its label an input spike may be, either way, ms.
