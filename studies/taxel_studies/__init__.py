@@ -24,6 +24,7 @@ STUDIES = {
     "adaptive_ramp": "a ramp that adapts to the signal: steep in gross movement, gentle in fine control",
     "fig4.6": "a taxel's voltage against its load at two line voltages: sensitivity against range",
     "fig4.7": "the transducer's answer to an impact, and settling while four channels are multiplexed",
+    "foam": "one foam for all dropped balls, from three numbers that the thesis states of them",
     "fig4.8": "a tennis ball dropped on the array: its frames, and its bits by sampling rate (4.8, 4.10)",
     "fig4.9": "drops of a tennis ball laid out by t-SNE, by sampling rate",
     "contact": "a half disc pressed on silicone, sampled by taxels at its base (5.1 to 5.4)",

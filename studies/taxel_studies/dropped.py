@@ -19,6 +19,9 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
 from taxel_studies.study import Kept
 
+#: The foam of all drops, and how stiff a tennis ball is: what the study foam finds (the rest of the foam is taxel's).
+FOAM: dict[str, float] = {"modulus_kpa": 60.0, "damping_s_m": 0.25, "dashpot_ms": 1.0}
+TENNIS_N_MM = 25.0
 #: The experiment of 5.6.2: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
 TABLE: dict[str, Any] = {
     "balls_mm": [50.0, 70.0],
@@ -30,9 +33,11 @@ TABLE: dict[str, Any] = {
     "height_sd_mm": 2.0,
     "place_sd_mm": 5.0,
     "board": 56,
+    "foam": FOAM,
+    "stiffness_n_mm": None,
 }
 #: Those parameters, beside the condition and a seed, that the drops depend on.
-_DRAWN = ("drops", "mass_g", "mass_by_g", "height_sd_mm", "place_sd_mm", "board")
+_DRAWN = ("drops", "mass_g", "mass_by_g", "height_sd_mm", "place_sd_mm", "board", "foam", "stiffness_n_mm")
 #: The experiment of 5.6.2 at a size that takes seconds.
 TOY: dict[str, Any] = {"heights_mm": [100.0, 200.0], "slants_deg": [0.0], "drops": 8}
 #: The experiment of 4.4.2: a tennis ball from two heights at two slants, 100 trials each; how trials differ is a guess.
@@ -46,6 +51,8 @@ TENNIS_TABLE: dict[str, Any] = {
     "height_sd_mm": 5.0,
     "place_sd_mm": 5.0,
     "board": 44,
+    "foam": FOAM,
+    "stiffness_n_mm": TENNIS_N_MM,
 }
 #: The experiment of 4.4.2 at a size that takes seconds.
 TENNIS_TOY: dict[str, Any] = {"drops": 8}
@@ -76,8 +83,6 @@ class Rig(NamedTuple):
     """How long a drop is recorded."""
     around: str
     """The region's middle: of the taxels that answer in the impact's first frame the "mean", or the "first"."""
-    stiffness_n_mm: float | None = None
-    """Stiffness of a ball that is not rigid."""
 
     @property
     def frame_us(self) -> float:
@@ -92,8 +97,8 @@ class Rig(NamedTuple):
 
 #: The rig of 5.6.2.
 IMPACTS = Rig("5.2 kHz", REGION, LENGTH_MS, "mean")
-#: The rig of 4.4.2: figure 4.10 shows 40 ms. A tennis ball gives by some 25 N/mm.
-TENNIS = Rig("2 kHz", 17, 40.0, "first", stiffness_n_mm=25.0)
+#: The rig of 4.4.2: figure 4.10 shows 40 ms.
+TENNIS = Rig("2 kHz", 17, 40.0, "first")
 
 
 class Condition(NamedTuple):
@@ -114,6 +119,12 @@ class Drops(NamedTuple):
     """How many change events the region gave in that time, by drop."""
     lasted_us: NDArray[np.float64]
     """Time from the first of these events to the last, by drop."""
+    contact_events: NDArray[np.int64]
+    """How many of them came while the ball touched for the first time."""
+    contact_us: NDArray[np.float64]
+    """Time from the first of those to the last (5.7)."""
+    contact_taxels: NDArray[np.int64]
+    """How many taxels of the whole array rose meanwhile."""
 
 
 def conditions(p: Mapping[str, Any]) -> list[Condition]:
@@ -141,7 +152,7 @@ def _drop(p: Mapping[str, Any], condition: Condition, seed: int, rig: Rig) -> Dr
     rng = np.random.default_rng([seed, *(round(1000 * part) for part in condition)])
     acts: list[Silence | Scene] = [Silence(_BEFORE_MS)]
     acts += [_scene(p, condition, rng, rig) for _ in range(p["drops"])]
-    impacts = [contact.start_us for contact in truth(acts, preset=rig.preset)[0] if contact.kind == "first"]
+    impacts = [(one.start_us, one.stop_us) for one in truth(acts, preset=rig.preset)[0] if one.kind == "first"]
     return _around(play(acts, seed=p["board"], preset=rig.preset).events, impacts, rig)
 
 
@@ -150,10 +161,10 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator,
     fall_ms = float(np.sqrt(2 * height / 9.81e-3))
     array = Array.thesis()
     x, y = ((n - 1) * array.column_mm / 2 + rng.normal(0, p["place_sd_mm"]) for n in (array.columns, array.rows))
-    gives = {} if rig.stiffness_n_mm is None else {"stiffness_n_mm": rig.stiffness_n_mm}
+    gives = {} if p["stiffness_n_mm"] is None else {"stiffness_n_mm": p["stiffness_n_mm"]}
     return Scene(
         {
-            "foam": {},
+            "foam": dict(p["foam"]),
             "bodies": [
                 {
                     "shape": {"sphere": {"radius_mm": condition.ball_mm / 2}},
@@ -180,7 +191,7 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator,
     )
 
 
-def _around(events: Events, impacts: Sequence[float], rig: Rig) -> Drops:
+def _around(events: Events, impacts: Sequence[tuple[float, float]], rig: Rig) -> Drops:
     """Cut the readings of the region around each impact out of a recording (4.4.2, 5.6.2).
 
     Raises
@@ -195,9 +206,10 @@ def _around(events: Events, impacts: Sequence[float], rig: Rig) -> Drops:
     index = events.array.index(events.x, events.y)
     held = np.zeros(rows * columns, np.uint16)
     ticks = np.zeros((len(impacts), 1 + rig.frames, rig.region**2), np.uint16)
-    counts, lasted = np.zeros(len(impacts), np.int64), np.zeros(len(impacts))
+    counts, touched, taxels = np.zeros((3, len(impacts)), np.int64)
+    lasted, contact = np.zeros((2, len(impacts)))
     done = 0
-    for k, impact in enumerate(impacts):
+    for k, (impact, parted) in enumerate(impacts):
         at = int(impact / rig.frame_us)
         soon = slice(*np.searchsorted(frame, [at, at + rig.frames]))
         rises = np.bincount(frame[soon][events.p[soon]] - at, minlength=rig.frames)
@@ -219,7 +231,13 @@ def _around(events: Events, impacts: Sequence[float], rig: Rig) -> Drops:
         done = int(edges[-1])
         mine = frame[first:done][np.isin(index[first:done], region)]
         counts[k], lasted[k] = len(mine), (mine[-1] - mine[0]) * rig.frame_us
-    return Drops(ticks, counts, lasted)
+        # The frame in which the ball parts still shows it.
+        last = int(parted / rig.frame_us) + 1
+        touched[k] = np.searchsorted(mine, last, side="right")
+        contact[k] = (mine[touched[k] - 1] - mine[0]) * rig.frame_us
+        meanwhile = slice(first, int(np.searchsorted(frame, last, side="right")))
+        taxels[k] = len(np.unique(index[meanwhile][events.p[meanwhile]]))
+    return Drops(ticks, counts, lasted, touched, contact, taxels)
 
 
 def _corner(places: NDArray[Any], size: int, region: int) -> int:
