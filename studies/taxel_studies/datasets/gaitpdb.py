@@ -49,7 +49,7 @@ def trials(path: Path) -> Iterator[Trial]:
     ------
     Trial
         Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot, at the places that the source states,
-        without a unit; ``series["total"]`` is the total force in N.
+        without a unit; ``series["total"]`` is the total force in N, ``about`` has the speed of ``people.csv``.
 
     Raises
     ------
@@ -63,7 +63,8 @@ def trials(path: Path) -> Iterator[Trial]:
     if len(t) < 2 or len(back):
         line = back[0] + 2 if len(back) else 1
         raise FormatError(f"{path.name}, line {line}: must have 2 lines or more, whose times ascend")
-    known = table(path.parent / "events.csv")
+    known, people = table(path.parent / "events.csv"), table(path.parent / "people.csv")
+    speeds = people["speed_m_s"][people["person"] == person].dropna().tolist() if len(people) else []
     for k, foot in enumerate(("left", "right")):
         total = values[:, 17 + k]
         own = known[(known["person"] == person) & (known["foot"] == foot)] if len(known) else known
@@ -82,6 +83,7 @@ def trials(path: Path) -> Iterator[Trial]:
             group="healthy" if match[3] == "Co" else "patient",
             scored=scored_around(truth),
             series={"total": total},
+            about={"speed_m_s": speeds[0]} if speeds else {},
         )
 
 

@@ -20,4 +20,4 @@ PROTOCOL = (
     "Errors are neuron minus reference (negative: early), window ±50 ms, one to one; every further spike counts as "
     "false, inside the window too. Where parameters are chosen, they are chosen inside each training fold."
 )
-DATA = tuple(source.folder for source in SOURCES.values())
+DATA = tuple(dict.fromkeys(source.folder for source in SOURCES.values()))

@@ -48,7 +48,7 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``tested``: by row the detections (of SKIM these ``by_threshold``); ``point``: a neuron's, or a rule's numbers.
+        ``tested``: by row the detections (of SKIM these ``by_setting``); ``point``: a neuron's, or a rule's numbers.
     """
     source, left_out = params["source"], params["left_out"]
     folder = data / SOURCES[source].folder
@@ -159,20 +159,28 @@ def _judged(
 
 
 def _skim(rows: _Rows, point: Mapping[str, Any], left_out: int, params: Mapping[str, Any]) -> dict[str, Any]:
-    """Train SKIM as 6.5.4 does: the neuron's kernel, and every threshold tested."""
+    """Train SKIM as 6.5.4 does: the neuron's kernel; every width and height of the pulse and every threshold tested.
+
+    Least squares make the output proportional to the height, so a height divides the threshold.
+    """
     event, later = rows.event, rows.encoding.latency_ms + point["learner"]["delay_ms"]
     patterns = rows.patterns([left_out], params["train"])
-    neuron = {name: point["learner"][name] for name in ("tau", "step_ms")}
-    skim = SKIM(**neuron, within_ms=WINDOW_MS, **params["skim"])
-    skim.fit([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
-    tested = {
-        f"{threshold:g}": {
-            p.name: _scored(skim.predict([p.spikes], threshold=threshold)[0], p, event, later)
-            for p in rows.rows(rows.pieces(left_out))
-        }
-        for threshold in skim.thresholds
-    }
-    return {"by_threshold": tested}
+    step_ms = point["learner"]["step_ms"]
+    tested: dict[str, dict[str, Any]] = {}
+    for pulse_ms in params["skim"]["pulses_ms"]:
+        skim = SKIM(tau=point["learner"]["tau"], step_ms=step_ms, pulse_ms=pulse_ms)
+        skim.fit([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
+        levels = sorted({t / height for t in skim.thresholds for height in params["skim"]["heights"]})
+        for p in rows.rows(rows.pieces(left_out)):
+            output = skim.output(p.spikes)
+            for level in levels:
+                above = output >= level
+                rises = above & ~np.concatenate([[False], above[:-1]])
+                for spikes, fired in (("units", above), ("crossings", rises)):
+                    times = p.spikes.start + step_ms * np.flatnonzero(fired)
+                    key = f"{spikes}, {pulse_ms:g} ms, {level:.4g}"
+                    tested.setdefault(key, {})[p.name] = _scored(times, p, event, later)
+    return {"by_setting": tested}
 
 
 def _scored(spikes: NDArray[np.float64], piece: Piece, event: str, later: float) -> dict[str, Any]:
@@ -191,6 +199,7 @@ def _plain(result: Score, piece: Piece) -> dict[str, Any]:
         "group": piece.group,
         "events": result.events,
         "false": result.false,
+        "false_near": result.false_near,
         "minutes": round((piece.scored[1] - piece.scored[0]) / 60_000, 4),
         "errors": [round(float(e), 1) for e in result.errors_ms],
         "delays": [round(float(d), 1) for d in result.delays_ms],

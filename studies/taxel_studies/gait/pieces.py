@@ -36,6 +36,8 @@ class Piece:
         Where the truth is complete.
     load : (times ms, values)
         The sum over the sensors whose threshold the labels are, for the labels' own rule; nothing where there is none.
+    speed_m_s : float
+        NaN where it is not known.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Piece:
     truth: Mapping[str, NDArray[np.float64]]
     scored: tuple[float, float]
     load: Signal = (np.empty(0), np.empty(0))
+    speed_m_s: float = np.nan
 
     @property
     def duration(self) -> float:

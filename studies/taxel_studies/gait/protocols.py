@@ -12,7 +12,7 @@ import numpy as np
 from taxel.detect import Part
 from taxel.spikes import to_us
 from taxel_studies.gait.pieces import Piece
-from taxel_studies.gait.recipes import RECIPE
+from taxel_studies.gait.recipes import PRINTED
 from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import encoded
 
@@ -25,6 +25,8 @@ ROWS = {
 }
 #: Draws the folds.
 SEED = 1
+#: Classes of speed.
+SPEEDS = ("slow", "middle", "fast")
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,18 @@ def by_person(pieces: Sequence[Piece], folds: int) -> list[Scope]:
     ]
     groups = [tuple(n for person in people[k::folds] for n in _of(pieces, person)) for k in range(folds)]
     return [Scope("all people", tuple(group for group in groups if group))]
+
+
+def by_speed(pieces: Sequence[Piece], folds: int) -> list[Scope]:
+    """Leave people out, by themselves among the slow, the middle and the fast: three classes of as many people."""
+    speeds = {piece.person: piece.speed_m_s for piece in pieces if np.isfinite(piece.speed_m_s)}
+    classes = np.array_split(sorted(speeds, key=lambda person: (speeds[person], person)), len(SPEEDS))
+    scopes = []
+    for name, people in zip(SPEEDS, classes, strict=True):
+        order = np.random.default_rng(SEED).permutation(people)
+        groups = (tuple(n for person in order[k::folds] for n in _of(pieces, person)) for k in range(folds))
+        scopes.append(Scope(name, tuple(group for group in groups if group)))
+    return scopes
 
 
 def by_footfall(pieces: Sequence[Piece], folds: int) -> list[Scope]:
@@ -112,7 +126,12 @@ class Protocol:
 
 
 #: How pieces are split, by protocol.
-SPLITS = {"people left out": by_person, "own footfalls": by_footfall, "time within a person": by_time}
+SPLITS = {
+    "people left out": by_person,
+    "four folds": by_speed,
+    "own footfalls": by_footfall,
+    "time within a person": by_time,
+}
 _NEURONS = ("recipe", "chosen", "printed")
 PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
     "plate": (
@@ -141,6 +160,11 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             (*_NEURONS, "count", "labels' own rule"),
             {"seconds": 30},
             {"seconds": 15},
+        ),
+    ),
+    "gaitpdb by speed": (
+        Protocol(
+            "four folds", "four folds by person in each class of speed (6.5.3)", 4, ("printed",), {"seconds": 30}, {}
         ),
     ),
     "gaitndd": (
@@ -173,6 +197,6 @@ def of(source: str, name: str) -> Protocol:
 def scopes(folder: Path, source: str, name: str) -> tuple[Scope, ...]:
     """Split the recordings of a source's folder as one of its protocols says; scopes of one group are left out."""
     # Any encoder will do: the names and lengths of the pieces count.
-    pieces = encoded(folder, source, next(iter(RECIPE[source].values()))["encoder"]).pieces
+    pieces = encoded(folder, source, next(iter(PRINTED[source].values()))["encoder"]).pieces
     split = SPLITS[name](pieces, of(source, name).folds)
     return tuple(scope for scope in split if len(scope.groups) > 1)

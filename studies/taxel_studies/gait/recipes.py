@@ -14,7 +14,13 @@ from typing import Any
 Point = dict[str, Any]
 
 _FILE = tomllib.loads(Path(__file__).with_name("recipes.toml").read_text(encoding="utf-8"))
-_EVENTS: dict[str, dict[str, Any]] = {name: source["events"] for name, source in _FILE["sources"].items()}
+_EVENTS: dict[str, dict[str, Any]] = {name: source.get("events", {}) for name, source in _FILE["sources"].items()}
+#: The encoder of Table 6.2 by source and event: that of the recipe, on the plate one level (6.5.1), or its own.
+_PRINTED = {
+    source: _FILE["sources"][source].get("printed")
+    or {name: "one" if source == "plate" else event["encoder"] for name, event in events.items()}
+    for source, events in _EVENTS.items()
+}
 
 
 def _point(encoder: str, *learner: dict[str, Any]) -> Point:
@@ -40,12 +46,9 @@ RECIPE = {source: {name: points[0] for name, points in events.items()} for sourc
 #: Table 6.2 as printed.
 PRINTED = {
     source: {
-        name: _point(
-            "one" if source == "plate" else event["encoder"], _FILE["printed"]["learner"], _FILE["printed"][name]
-        )
-        for name, event in events.items()
+        name: _point(encoder, _FILE["printed"]["learner"], _FILE["printed"][name]) for name, encoder in events.items()
     }
-    for source, events in _EVENTS.items()
+    for source, events in _PRINTED.items()
 }
 #: The encoders that give the plain rules their input.
 RULE_ENCODERS = {

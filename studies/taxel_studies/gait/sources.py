@@ -11,18 +11,21 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel import ProblemError
 from taxel.array import Array
 from taxel.encode import Encoder
 from taxel.frames import Frames
 from taxel.spikes import to_ms
-from taxel_studies.datasets import Trial, data_set, plate
+from taxel_studies.datasets import DataSet, Trial, data_set, plate
 from taxel_studies.datasets import files as files_of
 from taxel_studies.datasets import trials as trials_of
 from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
 
+#: The sensors under the heel of gaitpdb, and at which share of their peak of a step the heel is off.
+HEEL, HEEL_OFF = slice(3), 0.05
 #: Silence before each footfall of the plate, ms: random, so that its length does not reveal when events come.
 SILENCE_MS = (300, 900)
 #: A footfall's piece ends so long after foot-off, ms; by then the encoder's latency and the delay are over.
@@ -46,6 +49,8 @@ class Source:
         The events whose labels are thresholds of a sum over the sensors.
     by_minute : bool
         Whether it has minutes of walking, not footfalls.
+    data : str
+        The data set, if it has another name.
     """
 
     name: str
@@ -56,6 +61,7 @@ class Source:
     shows: str
     by_threshold: tuple[str, ...] = ()
     by_minute: bool = True
+    data: str = ""
 
 
 SOURCES = {
@@ -86,6 +92,15 @@ SOURCES = {
             ("contact", "foot_off"),
         ),
         Source(
+            "gaitpdb by speed",
+            "insole_gaitpdb",
+            "The same walks in three classes of speed, eight people each (PhysioNet gaitpdb)",
+            ("contact", "heel_off", "foot_off"),
+            "As gaitpdb; heel-off, as we define it, is the fall of sensors 1 to 3 below 5 % of their peak of a step.",
+            "Whether one neuron serves people of about one speed (6.5.3 has one person at three speeds).",
+            data="gaitpdb",
+        ),
+        Source(
             "gaitndd",
             "insole_gaitndd",
             "Five minutes of walking, one channel, left foot (PhysioNet gaitndd)",
@@ -108,7 +123,7 @@ def present(data: Path, wanted: Sequence[str]) -> dict[str, Path]:
     if unknown := [name for name in wanted if name not in SOURCES]:
         raise ProblemError(f"sources is {unknown[0]!r}: must be one of {', '.join(map(repr, SOURCES))}")
     folders = {name: data / SOURCES[name].folder for name in wanted}
-    return {name: at for name, at in folders.items() if at.is_dir() and files_of(data_set(name), at)}
+    return {name: at for name, at in folders.items() if at.is_dir() and files_of(_data_set(name), at)}
 
 
 @lru_cache(maxsize=8)
@@ -119,14 +134,18 @@ def _trials(folder: Path, name: str) -> tuple[Trial, ...]:
     ------
     FormatError : a file that breaks its format (names it)
     """
-    return tuple(_boxed(trial) if name == "plate" else trial for trial in trials_of(data_set(name), folder))
+    return tuple(_boxed(trial) if name == "plate" else trial for trial in trials_of(_data_set(name), folder))
+
+
+def _data_set(name: str) -> DataSet:
+    return data_set(SOURCES[name].data or name)
 
 
 def fingerprint(folder: Path, name: str) -> str:
     """Return a short digest of a source's files: names and contents."""
     digest = hashlib.sha256()
     beside = [f for f in sorted(folder.iterdir()) if f.suffix in {".csv", ".let", ".ts"}]
-    for file in [*files_of(data_set(name), folder), *beside]:
+    for file in [*files_of(_data_set(name), folder), *beside]:
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -169,18 +188,33 @@ def _walks(folder: Path, name: str, encoder: Encoder) -> list[Piece]:
         start, stop = (to_ms(float(t)) for t in (trial.frames.t[0], trial.frames.t[-1]))
         spikes = encoder.encode(trial.frames).split_by_sign()
         spikes = _moved(spikes, -start, stop - start)
+        truth = dict(trial.truth) | ({"heel_off": _heel_offs(trial)} if "heel_off" in SOURCES[name].events else {})
         pieces.append(
             Piece(
                 name=trial.name,
                 person=trial.person,
                 group=trial.group,
                 spikes=spikes,
-                truth={e: to_ms(times) - start for e, times in trial.truth.items()},
+                truth={e: to_ms(times) - start for e, times in truth.items()},
                 scored=(to_ms(trial.scored[0]) - start, to_ms(trial.scored[1]) - start),
                 load=(to_ms(trial.frames.t) - start, trial.series["total"]) if trial.series else Piece.load,
+                speed_m_s=float(trial.about.get("speed_m_s", np.nan)),
             )
         )
     return pieces
+
+
+def _heel_offs(trial: Trial) -> NDArray[np.int64]:
+    """Return when the heel's load falls for good below a share of its peak, in each step where it does, us."""
+    t, load = trial.frames.t, trial.frames.values[:, 0, HEEL].sum(axis=1)
+    times = []
+    for begin, end in zip(trial.truth["contact"], trial.truth["foot_off"], strict=True):
+        first, stop = np.searchsorted(t, [begin, end])
+        step = load[first:stop]
+        last = first + int(np.flatnonzero(step >= HEEL_OFF * step.max())[-1]) + 1
+        if last < stop:
+            times.append(t[last])
+    return np.array(times, np.int64)
 
 
 def _footfalls(folder: Path, name: str, encoder: Encoder) -> list[Piece]:
