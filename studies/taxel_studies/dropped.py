@@ -348,6 +348,24 @@ def spatial_grams(
     return grams
 
 
+def summed_over_trains(
+    spikes: NDArray[np.uint8], period_ms: float, tau: float, kernel: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Return the distances of all patterns as 5.12 prints them: Euclidean norms over time, summed over trains.
+
+    Parameters are those of `spatial_grams`, with one kernel.
+    """
+    count, samples, layers, taxels = spikes.shape
+    state = np.zeros((count, layers, taxels), np.float32)
+    smooth = np.empty((layers * taxels, count, samples), np.float32)
+    for k in range(samples):
+        state = state * np.float32(np.exp(-period_ms / tau)) + spikes[:, k]
+        smooth[:, :, k] = (state.reshape(-1, taxels) @ kernel).reshape(count, -1).T
+    # As in `spatial_grams`: each sample but the last counts until the next one.
+    smooth[:, :, :-1] *= np.float32(np.sqrt(-np.expm1(-2 * period_ms / tau)))
+    return np.asarray(sum(distances_of((one @ one.T).astype(np.float64)) for one in smooth))
+
+
 def distances_of(gram: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the Euclidean distances of trials from their inner products."""
     length = np.diag(gram)

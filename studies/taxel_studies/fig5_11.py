@@ -23,8 +23,9 @@ PROTOCOL = (
     "apart. Trains are smoothed in time (5.8) and over taxels (5.11, a train counting twice at its own taxel, as "
     "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
     "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "
-    "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
-    "it: sampling begun at any phase, at the best tau and sigma."
+    "Panzeri and Treves. Tau and sigma are searched on the same drops, as in the thesis: the pair of most bits at any "
+    "period serves all; beside it each period's own, sampling begun at any phase, and Euclidean norms summed over "
+    "trains, as 5.12 prints it."
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -70,25 +71,57 @@ shared = dropped.shared
 
 
 def tasks(p: Parameters) -> list[Task]:
-    """List the search, one realisation a period and tau; then one a period, which looks at the best of them closely."""
-    return grid(p, period_ms="periods_ms", tau_ms="taus_ms") + grid(p, period_ms="periods_ms")
+    """List the search, one realisation a period and tau; then one a period, which looks at two pairs closely."""
+    return [*_search(p), *grid({**p, "over_ms": p["periods_ms"]}, period_ms="periods_ms")]
+
+
+def _search(p: Parameters) -> list[Task]:
+    return grid(p, period_ms="periods_ms", tau_ms="taus_ms")
 
 
 def realise(params: dict[str, Any], _seed: int, kept: Kept) -> Any:
-    """Compare all drops at a period: return the bits of neighbours' answers by sigma; without a tau, of the best."""
+    """Compare all drops at a period: return the bits of neighbours' answers by sigma; without a tau, of two pairs.
+
+    These are the pair of most bits at any period, and at this one.
+    """
     period, sigmas, pitch = params["period_ms"], params["sigmas_mm"], Array.thesis().column_mm
     spikes, y = _spikes(params, kept, aligned=True)
-    whole = spikes.shape[1]
     if "tau_ms" in params:
         kernels = [dropped.smoothed(REGION, pitch, sigma) for sigma in sigmas]
-        grams = dropped.spatial_grams(spikes, period, params["tau_ms"], kernels, [whole])
+        grams = dropped.spatial_grams(spikes, period, params["tau_ms"], kernels, [spikes.shape[1]])
         return [_bits(distances_of(gram[0]), y, params)["bits"] for gram in grams]
-    search = {task.params["tau_ms"]: task for task in grid(params, tau_ms="taus_ms")}
-    searched = {tau: kept.row(realise, {"kept": kept}, task).result for tau, task in search.items()}
-    bits = {(tau, sigma): b for tau, by_sigma in searched.items() for sigma, b in zip(sigmas, by_sigma, strict=True)}
-    tau, sigma = max(bits, key=lambda at: bits[at])
-    kernel = dropped.smoothed(REGION, pitch, sigma)
+    shared = {name: value for name, value in params.items() if name not in ("period_ms", "over_ms")}
+    found = {
+        (task.params["period_ms"], task.params["tau_ms"], sigma): bits
+        for task in _search({**shared, "periods_ms": params["over_ms"]})
+        for sigma, bits in zip(sigmas, kept.row(realise, {"kept": kept}, task).result, strict=True)
+    }
+    here = {at[1:]: bits for at, bits in found.items() if at[0] == period}
+    pairs = {ONE: max(found, key=lambda at: found[at])[1:], EACH: max(here, key=lambda at: here[at])}
     late = _spikes(params, kept, aligned=False)[0]
+    looks = {pair: _look(spikes, late, y, params, *pair) for pair in dict.fromkeys(pairs.values())}
+    kernel = dropped.smoothed(REGION, pitch, pairs[ONE][1])
+    summed = dropped.summed_over_trains(spikes, period, pairs[ONE][0], kernel)
+    return {
+        "period_ms": period,
+        "searched": [[*pair, bits] for pair, bits in here.items()],
+        "looks": {reading: looks[pair] for reading, pair in pairs.items()},
+        "summed_bits": _bits(summed, y, params)["bits"],
+        "events": round(float(spikes.sum()) / len(spikes), 1),
+    }
+
+
+def _look(
+    spikes: NDArray[np.uint8],
+    late: NDArray[np.uint8],
+    y: NDArray[np.int64],
+    params: dict[str, Any],
+    tau: float,
+    sigma: float,
+) -> dict[str, Any]:
+    """Return the bits at a period and pair: of all, by parameter, by time since impact, and begun at any phase."""
+    period, whole = params["period_ms"], spikes.shape[1]
+    kernel = dropped.smoothed(REGION, Array.thesis().column_mm, sigma)
     any_phase = dropped.spatial_grams(late, period, tau, [kernel], [whole])[0][0]
     ends = [_samples_before(t, period, whole) for t in params["times_ms"]]
     every = sorted({*ends, whole})
@@ -98,10 +131,8 @@ def realise(params: dict[str, Any], _seed: int, kept: Kept) -> Any:
         "period_ms": period,
         "tau_ms": tau,
         "sigma_mm": sigma,
-        "searched": sorted([tau, by_sigma] for tau, by_sigma in searched.items()),
         "any_phase_bits": _bits(distances_of(any_phase), y, params)["bits"],
         **_bits(distances_of(by_end[whole]), y, params, by=True),
-        "events": round(float(spikes.sum()) / len(spikes), 1),
         "times": [[t, times[end]] for t, end in zip(params["times_ms"], ends, strict=True)],
     }
 
@@ -139,47 +170,45 @@ def _bits(
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """List the bits by period."""
-    lines = [row.result for row in rows if "tau_ms" not in row.params]
-    return {"lines": sorted(lines, key=lambda line: line["period_ms"]), "conditions": len(dropped.conditions(p))}
+    """List the bits by period, of each reading."""
+    found = sorted((row.result for row in rows if "tau_ms" not in row.params), key=lambda one: one["period_ms"])
+    return {
+        "readings": {reading: [one["looks"][reading] for one in found] for reading in (ONE, EACH)},
+        "summed_bits": [one["summed_bits"] for one in found],
+        "searched": [[one["period_ms"], one["searched"]] for one in found],
+        "conditions": len(dropped.conditions(p)),
+    }
 
 
 def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
-    """Judge what 5.6.4 and 5.8 say: with the pair of most bits at any period for all of them, and with each its own.
-
-    What was looked at closely has each period's own pair.
-    """
-    lines = summary["lines"]
-    periods = [line["period_ms"] for line in lines]
+    """Judge what 5.6.4 and 5.8 say: with the pair of most bits at any period for all of them, and with each its own."""
     size = f"{summary['conditions']} conditions, {p['drops']} drops each, {p['neighbours']} neighbours"
+    lines = summary["readings"][ONE]
+    periods = [line["period_ms"] for line in lines]
     best = max(lines, key=lambda line: line["bits"])
     pair = best["tau_ms"], best["sigma_mm"]
-    row = p["sigmas_mm"].index(pair[1])
-    one = [dict(map(tuple, line["searched"]))[pair[0]][row] for line in lines]
-    own = [line["bits"] for line in lines]
     searched = "searched on the same drops, as in the thesis; our places and noise are not its"
     if pair[1] == max(p["sigmas_mm"]):
         searched = f"the best sigma is the widest that was searched; {searched}"
-    beyond = _beyond_printed(p, next((line for line in lines if line["period_ms"] == PRINTED["period_ms"]), None))
-    yield Judgement(
-        36,
-        f"{pair[0]:g} ms, {pair[1]:g} mm at {_ms(best['period_ms'])}; {beyond}",
-        pair == (PRINTED["tau_ms"], PRINTED["sigma_mm"]),
-        searched,
-        ONE,
-    )
-    for reading, bits in ((ONE, one), (EACH, own)):
-        yield from _by_period(periods, bits, size, reading)
-    yield Judgement(
-        44,
-        listed([line["bits"] - line["any_phase_bits"] for line in lines], periods, "+.2f", "{:g} ms")
-        + " bits more than with sampling begun at any time",
-        bool(lines[-1]["bits"] > lines[-1]["any_phase_bits"]),
-        size,
-        EACH,
-    )
-    yield from _by_parameter(lines, size, EACH)
-    yield from _by_time(lines, size, EACH)
+    printed = PRINTED["tau_ms"], PRINTED["sigma_mm"]
+    there = {tuple(one[:2]): one[2] for one in dict(map(tuple, summary["searched"]))[best["period_ms"]]}
+    ours = f"{pair[0]:g} ms, {pair[1]:g} mm at {_ms(best['period_ms'])}"
+    if printed in there:
+        ours += f"; the printed point has {best['bits'] - there[printed]:.2f} bits less there"
+    yield Judgement(36, ours, pair == printed, searched, ONE)
+    yield from _by_period(periods, summary["summed_bits"], size, f"{ONE}, norms summed over trains (5.12)")
+    for reading, here in summary["readings"].items():
+        yield from _by_period(periods, [line["bits"] for line in here], size, reading)
+        yield Judgement(
+            44,
+            listed([line["bits"] - line["any_phase_bits"] for line in here], periods, "+.2f", "{:g} ms")
+            + " bits more than with sampling begun at any time",
+            bool(here[-1]["bits"] > here[-1]["any_phase_bits"]),
+            size,
+            reading,
+        )
+        yield from _by_parameter(here, size, reading)
+        yield from _by_time(here, size, reading)
 
 
 def _by_period(periods: list[float], bits: list[float], size: str, reading: str) -> Iterator[Judgement]:
@@ -210,14 +239,6 @@ def _by_period(periods: list[float], bits: list[float], size: str, reading: str)
 
 def _ms(period: float) -> str:
     return f"{period:g} ms"
-
-
-def _beyond_printed(p: Parameters, line: dict[str, Any] | None) -> str:
-    searched = {} if line is None else dict(map(tuple, line["searched"]))
-    if line is None or PRINTED["tau_ms"] not in searched or PRINTED["sigma_mm"] not in p["sigmas_mm"]:
-        return "the printed point was not asked"
-    bits = searched[PRINTED["tau_ms"]][p["sigmas_mm"].index(PRINTED["sigma_mm"])]
-    return f"at 1 ms the printed point has {line['bits'] - bits:.2f} bits less than the best"
 
 
 def _by_parameter(lines: list[dict[str, Any]], size: str, reading: str) -> Iterator[Judgement]:
@@ -255,7 +276,7 @@ def _by_time(lines: list[dict[str, Any]], size: str, reading: str) -> Iterator[J
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 5.11, 5.12 and 5.13."""
     return kept_bits.by_period_parameter_and_time(
-        summary,
+        {**summary, "lines": summary["readings"][ONE]},
         figures=("5.11", "5.12", "5.13"),
         curves={"bits": "sampled from the impact on", "any_phase_bits": "at any phase"},
         named=VARIED,

@@ -6,7 +6,6 @@ The search sees these numbers alone: no bit of information is computed in it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,8 @@ from matplotlib.figure import Figure
 from taxel import SceneError
 from taxel.spikes import to_ms
 from taxel_studies import dropped
-from taxel_studies.dropped import REGION, TENNIS, Condition
-from taxel_studies.study import Judgement, Kept, Parameters, Row, Summary, Table, Task, grid, subplots
+from taxel_studies.dropped import REGION, TENNIS
+from taxel_studies.study import Judgement, Kept, Parameters, Row, Summary, Task, grid, subplots
 
 WHERE = "thesis 4.4.2, 5.6.4 and 5.7, before figures 4.8 and 5.10"
 PROTOCOL = (
@@ -25,7 +24,8 @@ PROTOCOL = (
     "cm falls below a tenth of its peak within the 8 ms of figure 4.8 (T949, an inference from a picture that is "
     "lost); of the spheres of 5.6.2 the contact is larger than 16 x 16 taxels (T1284), here of the kind with the "
     "smallest; the highest rate of events is 659 kbit/s, at 9 bits, over the time of contact (T1307, T1309). The foam "
-    "with the least sum of squared relative residuals serves all drops; one that a ball of any kind crushes is none."
+    "with the least sum of squared relative residuals serves all drops; one that a ball crushes is none. "
+    "Balls fall level."
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -33,10 +33,10 @@ PARAMETERS: dict[str, Any] = {
     "dampings_s_m": [0.1, 0.25, 0.5],
     "dashpots_ms": [0.0, 1.0, 3.0],
     "balls_n_mm": [15.0, 25.0, 40.0],
-    "drops": 4,
+    "drops": 2,
     "seed": 1,
 }
-SIZES = {"toy": {"moduli_kpa": [30.0, 60.0], "dampings_s_m": [0.25], "dashpots_ms": [1.0], "drops": 2}}
+SIZES = {"toy": {"moduli_kpa": [30.0, 60.0], "dampings_s_m": [0.25], "dashpots_ms": [1.0]}}
 #: What is held against each, and its unit.
 DECAY_MS, TAXELS, KBIT_S = 8.0, REGION**2, 659.0
 #: Bits of an event in 5.7.
@@ -49,15 +49,13 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any] | None:
-    """Drop spheres of all extreme kinds and tennis balls of each stiffness; None on a foam that one crushes."""
+    """Drop spheres from least and greatest height, tennis balls of each stiffness; None on a foam that one crushes."""
     foam = {name: params[name] for name in ("modulus_kpa", "damping_s_m", "dashpot_ms")}
     shared = {"drops": params["drops"], "seed": params["seed"], "foam": foam}
-    spheres, tennis = {**dropped.TABLE, **shared}, {**dropped.TENNIS_TABLE, **shared}
-    heights, slants = (sorted(spheres[name])[:: len(spheres[name]) - 1] for name in ("heights_mm", "slants_deg"))
+    spheres = {**dropped.TABLE, **shared, "heights_mm": [100.0, 200.0], "slants_deg": [0.0]}
+    tennis = {**dropped.TENNIS_TABLE, **shared, "slants_deg": [0.0]}
     try:
-        played = [
-            dropped.played(spheres, Condition(*one), kept) for one in product(spheres["balls_mm"], heights, slants)
-        ]
+        played = [dropped.played(spheres, one, kept) for one in dropped.conditions(spheres)]
     except SceneError:
         return None
     rates = np.concatenate([EVENT_BITS * one.contact_events / to_ms(one.contact_us) for one in played])
@@ -103,13 +101,6 @@ def residuals(numbers: Mapping[str, float]) -> list[float]:
 def judge(_p: Parameters, _summary: Summary) -> Iterator[Judgement]:
     """Judge nothing: what is searched for is no test."""
     yield from ()
-
-
-def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List the ten best."""
-    head = ["kPa", "s/m", "dashpot, ms", "ball, N/mm", "decay, ms", "taxels", "kbit/s", "residuals"]
-    rows = [[*(f"{v:g}" for v in list(line.values())[:-1]), str(line["residuals"])] for line in summary["lines"][:10]]
-    yield Table("The ten best", head, rows, f"{summary['crushed']} foams are crushed by a sphere.")
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
