@@ -20,7 +20,7 @@ from taxel.wire import FRAME_US, Registers
 from taxel_studies.study import Kept
 
 #: The foam of all drops, and how stiff a tennis ball is: what the study foam finds (the rest of the foam is taxel's).
-FOAM: dict[str, float] = {"modulus_kpa": 60.0, "damping_s_m": 0.25, "dashpot_ms": 1.0}
+FOAM: dict[str, float] = {"modulus_kpa": 20.0, "damping_s_m": 0.1, "dashpot_ms": 3.0}
 TENNIS_N_MM = 25.0
 #: The experiment of 5.6.2: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
 TABLE: dict[str, Any] = {

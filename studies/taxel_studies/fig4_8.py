@@ -30,13 +30,13 @@ from taxel_studies.study import (
 WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
 PROTOCOL = (
     "A tennis ball (65 mm, 56 g) falls from 40 and 80 cm on the emulated board at 2 kHz, level and tilted by 30 "
-    "degrees, 100 times each, under the 10 mm of foam of 4.3.1; it gives by a spring of 25 N/mm, as a rigid one "
-    "would crush the foam. By guess, heights and places vary by 5 mm (standard deviations). 17 x 17 taxels around "
-    "the first that answered, 40 ms from the impact's first frame on (the first in which three taxels rise: one "
-    "alone may be noise), as ticks above those before it. Slower sampling: what the host holds is looked at every "
-    "so often, from that frame on, as the thesis resampled its films; beside it, from any phase on. Linear "
-    "discriminants of the frames, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
-    "by Panzeri and Treves."
+    "degrees, 100 times each, under the 10 mm of foam of 4.3.1, whose other values the study foam finds; it gives "
+    "by a spring of 25 N/mm, as a rigid one would crush the foam. By guess, heights and places vary by 5 mm "
+    "(standard deviations). 17 x 17 taxels around the first that answered, 40 ms from the impact's first frame on "
+    "(the first in which three taxels rise: one alone may be noise), as ticks above those before it. Slower "
+    "sampling: what the host holds is looked at every so often, from that frame on, as the thesis resampled its "
+    "films; beside it, from any phase on. Linear discriminants of the frames, 10 folds, the ridge chosen inside "
+    "them; bits of the answers (4.1), corrected by Panzeri and Treves."
 )
 
 PARAMETERS: dict[str, Any] = {

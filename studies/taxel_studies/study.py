@@ -66,6 +66,7 @@ CPU_SECONDS = {
     "asynchronous": ("full", 279),
     "drops": ("full", 294),
     "fa1": ("full", 217),
+    "foam": ("full", 208),
     "fig5.5": ("full", 5152),
     "fig5.7": ("full", 1257),
     "fig5.11": ("full", 728),
