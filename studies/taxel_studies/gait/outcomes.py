@@ -132,7 +132,8 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
         ran.setdefault(row.params["source"], {}).setdefault(row.params["protocol"], []).append(row)
     here = sources.present(data, p["sources"])
     skipped = [SOURCES[name].folder for name in SOURCES if name in p["sources"] and name not in here]
-    skipped += [f"{SOURCES[name].folder} (too few people or recordings)" for name in here if name not in ran]
+    asked = {name for name in here if {one.name for one in PROTOCOLS[name]} & {*p["protocols"]} or not p["protocols"]}
+    skipped += [f"{SOURCES[name].folder} (too few people or recordings)" for name in here if name in asked - ran.keys()]
     listed: list[dict[str, Any]] = []
     for name in (name for name in SOURCES if name in ran):
         source = SOURCES[name]
