@@ -2,8 +2,8 @@
 
 The files in the order of their use: `sources` (recordings, their truth, their spikes), `insole` (the cells of an insole
 under a footfall on a plate), `pieces`, `recipes` (all parameters, as data), `rules` (the plain rules beside the
-neuron), `protocols` (which folds), `fits` (one fit and its test), `outcomes` (the fits of a run and their summary),
-`judgement` (claims and tables) and `pictures`.
+neuron), `search` (the settings around Table 6.2), `protocols` (which folds), `fits` (one fit and its test), `outcomes`
+(the fits of a run and their summary), `judgement` (claims and tables) and `pictures`.
 """
 
 from taxel_studies.gait.fits import realise

@@ -36,10 +36,10 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     Parameters
     ----------
     params : dict
-        ``kind`` ("neuron", "skim" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (a group's number),
-        ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person); of a neuron its ``points``, and of
-        several how much trains in the folds in which one is chosen, ``search``; of SKIM a ``point`` and its own options
-        ``skim``; of a rule ``rule`` and ``encoder``.
+        ``kind`` ("neuron", "search", "skim" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (a group's
+        number), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person); of a neuron its
+        ``points``, and of several how much trains in the folds in which one is chosen, ``search``; of SKIM a
+        ``point`` and its own options ``skim``; of a rule ``rule`` and ``encoder``.
     seed : int
         Draws the footfalls and their order in the training row.
     data : Path
@@ -48,7 +48,8 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``tested``: by row the detections (of SKIM these ``by_setting``); ``point``: a neuron's, or a rule's numbers.
+        ``tested``: by row the detections (of SKIM these ``by_setting``); ``point``: a neuron's, or a rule's numbers;
+        of a search ``searched``: counts by point.
     """
     source, left_out = params["source"], params["left_out"]
     folder = data / SOURCES[source].folder
@@ -59,6 +60,8 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
 
     if params["kind"] == "neuron":
         return _neuron(rows, params["points"], left_out, params)
+    if params["kind"] == "search":
+        return _searched(rows(params["points"][0]["encoder"]), params["points"], left_out, params["train"])
     if params["kind"] == "skim":
         return _skim(rows(params["point"]["encoder"]), params["point"], left_out, params)
     return _rule(rows(params["encoder"]), params["rule"], left_out, params["train"])
@@ -133,6 +136,19 @@ def _neuron(
     judged = _judged(here, point, [([left_out], left_out)], params["train"])
     tested = zip(judged.scores, here.rows(here.pieces(left_out)), strict=True)
     return {"tested": {row.name: _plain(one, row) for one, row in tested}, "point": point}
+
+
+def _searched(
+    rows: _Rows, points: Sequence[Mapping[str, Any]], left_out: int, size: Mapping[str, int]
+) -> dict[str, Any]:
+    """Train and test every point in the same fold; count events, missed, false, and false within 50 ms of an event."""
+    tested, counted = rows.rows(rows.pieces(left_out)), []
+    for point in points:
+        scores = _judged(rows, point, [([left_out], left_out)], size).scores
+        units = [_plain(one, piece) for one, piece in zip(scores, tested, strict=True)]
+        counts = {name: sum(unit[name] for unit in units) for name in ("events", "false", "false_near")}
+        counted.append(counts | {"missed": counts["events"] - sum(len(unit["errors"]) for unit in units)})
+    return {"searched": counted}
 
 
 def _judged(

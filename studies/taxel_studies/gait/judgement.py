@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from taxel_studies.gait import insole
+from taxel_studies.gait import insole, search
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.protocols import ROWS
 from taxel_studies.study import Judgement, Parameters, Summary, Table
@@ -23,7 +23,7 @@ PUBLISHED = {"contact": (92, -2.0, 6.7), "foot_off": (93, -8.0, 17.0)}
 WALKED = {"contact": (94, 96), "heel_off": (110, 111), "foot_off": (95, 97)}
 #: A share found is not judged where more false detections than this come for each event.
 FALSE_SHARE = 0.05
-STAND = {"chosen": "chosen inside the folds", "printed": "Table 6.2 as printed"}
+STAND = {"chosen": "chosen inside the folds", "printed": "Table 6.2 as printed", "squared": ROWS["squared"]}
 
 
 def stand_for(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -117,6 +117,7 @@ def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     for source in summary["sources"]:
         for protocol in source["protocols"]:
             yield from _of_protocol(source, protocol)
+    yield from search.tables(summary["searched"])
 
 
 def _about(summary: Summary) -> list[list[str]]:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from taxel import ProblemError
-from taxel_studies.gait import insole, sources
+from taxel_studies.gait import insole, search, sources
 from taxel_studies.gait.protocols import PROTOCOLS, ROWS, Protocol, scopes
-from taxel_studies.gait.recipes import PRINTED, RECIPE, RULE_ENCODERS, SEARCH
+from taxel_studies.gait.recipes import PRINTED, RECIPE, RULE_ENCODERS, SEARCH, SQUARED
 from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import SOURCES, fingerprint
 from taxel_studies.study import Parameters, Row, Summary, Task
@@ -24,8 +24,13 @@ PARAMETERS: dict[str, Any] = {
     "protocols": [],  # all
     "events": 0,  # all; else so many of the first
     "points": 0,  # to choose from: all; else so many of the first
+    "rows": [],  # all
+    "grid": search.GRID,
 }
-SIZES = {"toy": {"protocols": ["people left out"], "events": 1, "points": 2}}
+SIZES = {
+    "toy": {"protocols": ["people left out"], "events": 1, "points": 2},
+    "search": {"sources": [search.SOURCE], "rows": ["searched"]},
+}
 
 
 def folds(folder: Path, source: str, protocol: Protocol) -> Iterator[dict[str, Any]]:
@@ -52,25 +57,30 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
             if protocol.name in (p["protocols"] or known):
                 groups = min((len(scope.groups) for scope in scopes(folder, name, protocol.name)), default=0)
                 for event in SOURCES[name].events[: p["events"] or None]:
-                    for row in protocol.rows:
+                    for row in (row for row in protocol.rows if row in (p["rows"] or ROWS)):
                         # A choice inside a fold leaves out a group more; some labels are no threshold of a sum.
                         if (row != "chosen" or groups > 2) and (
                             row != "labels' own rule" or event in SOURCES[name].by_threshold
                         ):
-                            asked = _asked(name, event, row, protocol, p["points"])
-                            listed += [Task(fold | asked, seed=1) for fold in folds(folder, name, protocol)]
+                            for asked in _asked(name, event, row, protocol, p):
+                                listed += [Task(fold | asked, seed=1) for fold in folds(folder, name, protocol)]
     return sorted(listed, key=_by_encoder)
 
 
-def _asked(source: str, event: str, row: str, protocol: Protocol, points: int) -> dict[str, Any]:
-    """Return what a row asks for in every fold of a protocol: a rule, or a neuron's points."""
+def _asked(source: str, event: str, row: str, protocol: Protocol, p: Parameters) -> Iterator[dict[str, Any]]:
+    """Give what a row asks for in every fold of a protocol: a rule, or a neuron's points."""
     asked = {"row": row, "event": event}
-    if row in RULES:
-        return asked | {"kind": "rule", "rule": row, "encoder": RULE_ENCODERS[source][event]}
-    if row == "chosen":
-        tried = SEARCH[source][event][: points or None]
-        return asked | {"kind": "neuron", "points": tried, "search": dict(protocol.search)}
-    return asked | {"kind": "neuron", "points": [{"recipe": RECIPE, "printed": PRINTED}[row][source][event]]}
+    if row == "searched":
+        if event in search.EVENTS:
+            yield from (asked | {"kind": "search", "points": points} for points in search.points(p["grid"], event))
+    elif row in RULES:
+        yield asked | {"kind": "rule", "rule": row, "encoder": RULE_ENCODERS[source][event]}
+    elif row == "chosen":
+        tried = SEARCH[source][event][: p["points"] or None]
+        yield asked | {"kind": "neuron", "points": tried, "search": dict(protocol.search)}
+    else:
+        point = {"recipe": RECIPE, "printed": PRINTED, "squared": SQUARED}[row][source][event]
+        yield asked | {"kind": "neuron", "points": [point]}
 
 
 def _by_encoder(task: Task) -> str:
@@ -128,12 +138,17 @@ def _spread(values: np.ndarray[Any, Any]) -> dict[str, float] | None:
 def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
     """Put all outcomes into plain values."""
     ran: dict[str, dict[str, list[Row]]] = {}
-    for row in rows:
+    searched = [row for row in rows if row.params["row"] == "searched"]
+    for row in (row for row in rows if row.params["row"] != "searched"):
         ran.setdefault(row.params["source"], {}).setdefault(row.params["protocol"], []).append(row)
     here = sources.present(data, p["sources"])
     skipped = [SOURCES[name].folder for name in SOURCES if name in p["sources"] and name not in here]
     asked = {name for name in here if {one.name for one in PROTOCOLS[name]} & {*p["protocols"]} or not p["protocols"]}
-    skipped += [f"{SOURCES[name].folder} (too few people or recordings)" for name in here if name in asked - ran.keys()]
+    skipped += [
+        f"{SOURCES[name].folder} (too few people or recordings)"
+        for name in here
+        if name in asked - ran.keys() and not searched
+    ]
     listed: list[dict[str, Any]] = []
     for name in (name for name in SOURCES if name in ran):
         source = SOURCES[name]
@@ -149,6 +164,7 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
             s: {e: len(points) for e, points in events.items()} for s, events in SEARCH.items() if events
         },
         "sources": listed,
+        "searched": search.summarise(searched),
         "conversion": _conversion(here["plate"]) if "plate" in ran else None,
     }
 

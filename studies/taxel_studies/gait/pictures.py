@@ -8,29 +8,30 @@ from typing import Any
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from taxel_studies.gait import insole
+from taxel_studies.gait import insole, search
 from taxel_studies.gait.judgement import STAND, stand_for
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.study import Parameters, Summary, subplots
 
 
 def draw(_p: Parameters, summary: Summary) -> list[Figure]:
-    """Draw 6.12 and 6.13, where there are footfalls of the plate, and 6.14, where what stands for 6.5 was run."""
+    """Draw, of what was run, 6.12 and 6.13 (footfalls of the plate), 6.14 (what stands for 6.5) and the search."""
     conversion, rows = summary["conversion"], stand_for(summary)
-    return [*([_conversion(conversion)] if conversion else []), *([_bars(rows)] if rows else [])]
+    figures = [*([_conversion(conversion)] if conversion else []), *([_bars(rows)] if rows else [])]
+    return [*figures, *search.draw(summary["searched"])]
 
 
 def _bars(rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw 6.14: top found, bottom error, a group a source and event."""
     figure, (top, bottom) = subplots(11, 6.5, 2, 1, sharex=True)
     groups = list(dict.fromkeys((r["source"], r["event"]) for r in rows))
-    for number, (name, label) in enumerate(STAND.items()):
+    for number, name in enumerate(("chosen", "printed")):
         for at, (source, event) in enumerate(groups):
             row = next((r for r in rows if (r["source"], r["event"], r["row"]) == (source, event, name)), None)
             if row is None:
                 continue
             x, style = at + 0.36 * (number - 0.5), {"width": 0.34, "color": f"C{3 - 3 * number}"}
-            top.bar(x, row["found_percent"], label=label if at == 0 else None, **style)
+            top.bar(x, row["found_percent"], label=STAND[name] if at == 0 else None, **style)
             top.annotate(f"{row['false']}", (x, 2), ha="center", fontsize=7, color="white")
             if row["error_ms"]:
                 bottom.bar(x, row["error_ms"]["mean"], yerr=row["error_ms"]["sd"], ecolor="0.3", capsize=3, **style)

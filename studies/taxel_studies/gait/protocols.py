@@ -20,7 +20,9 @@ from taxel_studies.gait.sources import encoded
 ROWS = {
     "recipe": "the study's own recipe (tuned on the shared people, and flattered by that)",
     "chosen": "parameters chosen inside the training folds (missed + false first, then error): the honest row",
-    "printed": "Table 6.2 as printed",
+    "printed": "Table 6.2 as printed, B as a sum, reset (docs/readings.md)",
+    "squared": "Table 6.2, B squared, keep",
+    "searched": "the search of 6.5.2 around Table 6.2",
     **RULES,
 }
 #: Draws the folds.
@@ -147,7 +149,7 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             "own footfalls",
             "40 of a person's 60 footfalls train, 20 test; every footfall is tested once a split",
             3,
-            _NEURONS,
+            (*_NEURONS, "squared", "searched"),
             {"count": 60},
             {"count": 60},
         ),

@@ -43,13 +43,19 @@ SEARCH: dict[str, dict[str, list[Point]]] = {
 }
 #: The recipes of the trials.
 RECIPE = {source: {name: points[0] for name, points in events.items()} for source, events in SEARCH.items()}
-#: Table 6.2 as printed.
-PRINTED = {
-    source: {
-        name: _point(encoder, _FILE["printed"]["learner"], _FILE["printed"][name]) for name, encoder in events.items()
+
+
+def _of_table(**changes: Any) -> dict[str, dict[str, Point]]:
+    shared = _FILE["printed"]["learner"]
+    return {
+        source: {name: _point(encoder, shared, _FILE["printed"][name], changes) for name, encoder in events.items()}
+        for source, events in _PRINTED.items()
     }
-    for source, events in _PRINTED.items()
-}
+
+
+#: Table 6.2 as printed, and with B squared.
+PRINTED = _of_table()
+SQUARED = _of_table(**_FILE["squared"])
 #: The encoders that give the plain rules their input.
 RULE_ENCODERS = {
     source: {name: _FILE["encoders"][event["rule"]] for name, event in events.items()}
