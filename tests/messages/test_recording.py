@@ -37,7 +37,6 @@ FILES = [
     ("a.npz", npz(t=[1], x=[2])),
     ("a.npz", npz(t=[1], x=[2], y=[3], p=[True, False])),
     ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], array="{")),
-    ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{}")),
     ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3)))),
     ("a.csv", b"\x89PNG\r\n"),
     ("a.csv", b""),
