@@ -106,7 +106,7 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
     tmp_path: Path, events: bool, until_s: float
 ) -> None:
     source, _ = preloaded(until_s=until_s, events=events)
-    path, where = tmp_path / "a.npz", "something was on rows 2 to 4, columns 5 to 7 (up to 4"
+    path, where = tmp_path / "a.npz", "rows 2 to 4, columns 5 to 7 (up to 4"
     taxel.convert(source, path)
     assert where in run("info", path).stdout
     taken = taxel.tasks.rest(taxel.open(path))
