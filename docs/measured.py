@@ -36,7 +36,8 @@ def measured() -> str:
 
 def results() -> str:
     """Return the text of the page of results that other pages cite."""
-    rows = [(one["name"], row) for one in _benchmarks() for row in one["rows"]]
+    every = _benchmarks()
+    rows = [(one["name"], row) for one in every for row in one["rows"]]
     figures = {(name, row[0]): row[1] for name, row in rows}
     goals = [[name, row[0], row[1], row[3]] for name, row in rows if row[4]]
     missed = [[name, row[0], row[1], row[3]] for name, row in rows if row[4] == VERDICTS[False]]
@@ -49,6 +50,7 @@ def results() -> str:
         goals=len(goals),
         reached=len(goals) - len(missed),
         missed=missed,
+        measured={one["name"]: f"{one['result']['date']}, {one['result']['commit']}" for one in every},
     )
 
 

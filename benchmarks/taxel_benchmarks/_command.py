@@ -40,8 +40,9 @@ def bench(
 ) -> int:
     """Compare the speed of taxel with other libraries, in one run; save the ratios.
 
-    Peers that are not installed are left out, with how to install them; a result that has them is then kept. Without
-    NAME, the benchmarks are listed, with what each took last.
+    A new result is compared with the saved one: a ratio fell if it changed by more than the quartiles of its rounds are
+    apart. Peers that are not installed are left out, with how to install them; a result that has them is then kept.
+    Without NAME, the benchmarks are listed, with what each took last.
 
     Example: taxel bench wire_decode
 
@@ -76,7 +77,7 @@ def bench(
     if not quick and "with local changes" in code_version("taxel", "taxel_benchmarks"):
         raise ProblemError("local changes since the last commit, which a result names: commit first, or give --quick")
     for one, benchmark in wanted.items():
-        result = _measured(one, quick=quick)
+        result, saved = _measured(one, quick=quick), _saved(results / f"{one}.json")
         if not quick:
             _save(result, results / f"{one}.json")
         if as_json:
@@ -86,6 +87,8 @@ def bench(
         say(*_rows(benchmark, result, result.get("ratios", {})))
         say(*(f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()))
         say(*(f"  {doubt}" for doubt in doubts_of(result)))
+        if saved and not quick:
+            say(*_compared(benchmark, result, saved))
     return 0
 
 
@@ -143,6 +146,29 @@ def doubts_of(result: Mapping[str, Any]) -> list[str]:
     others = machine.get("others")
     doubts = [_others(machine)] * (others is None or others > _BUSY * machine["cores"])
     return doubts + ["quartiles more than 15 % of the median apart"] * (result.get("stable") is False)
+
+
+def _compared(benchmark: Any, result: Mapping[str, Any], saved: Mapping[str, Any]) -> list[str]:
+    """Return which ratios fell, or rose where a goal wants less, by more than the quartiles of their rounds are apart.
+
+    The wider of both results counts; a ratio without rounds may vary as much as times that are called stable.
+    """
+    from taxel_benchmarks._rounds import WIDEST  # noqa: PLC0415  the command line starts quickly
+
+    shrinking = {goal.what for goal in benchmark.goals(result) if goal.at_most}
+    fallen = []
+    for name, was in saved.get("ratios", {}).items():
+        if was is None or (now := result["ratios"].get(name)) is None:
+            continue
+        spreads = [
+            high - low for low, high in (of["spread"][name] for of in (saved, result) if name in of.get("spread", {}))
+        ]
+        spread = max(spreads, default=WIDEST * abs(was))
+        if (now - was if name in shrinking else was - now) > spread:
+            fallen.append(f"    {name}: {was:.5g} before, {now:.5g} now, spread {spread:.3g}")
+    about = [f"commit {saved.get('commit', 'unknown')}", saved.get("date"), saved.get("machine", {}).get("cpu")]
+    worse = f"{len(fallen)} of {len(saved.get('ratios', {}))} ratios fell by more than their spread"
+    return [f"  against the result before ({', '.join(filter(None, about))}): {worse}", *fallen]
 
 
 def _others(machine: Mapping[str, Any]) -> str:

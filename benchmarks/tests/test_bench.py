@@ -67,6 +67,35 @@ def test_a_result_of_changed_code_is_refused(folder: Path, capsys, monkeypatch: 
     assert json.loads(place.read_text())["ratios"] == {"a": 3.0}
 
 
+@pytest.mark.parametrize(
+    ("was", "now", "spread", "said"),
+    [
+        ({"a": 3.0, "b": 2.0}, {"a": 2.8, "b": 2.2}, [2.9, 3.11], 0),
+        ({"a": 3.0, "b": 2.0}, {"a": 2.8, "b": 1.0}, [2.95, 3.05], 1),
+        ({"a": 3.0, "b": 2.0}, {"a": 9.0, "b": 2.31}, [2.95, 3.05], 1),
+        ({"a": 3.0, "gone": 2.0, "b": None}, {"a": 2.0, "b": 1.0}, None, 1),
+        ({}, {"a": 2.0, "b": 1.0}, None, 0),
+    ],
+)
+def test_a_result_is_compared_with_the_saved_one_by_the_spread_of_the_wider(
+    folder: Path, capsys, monkeypatch: pytest.MonkeyPatch, was: dict, now: dict, spread: list | None, said: int
+) -> None:
+    """Of `a` more is better and it may have rounds; `b` must be at most 2, and has none."""
+    goals = 'at_least({"a": 3.0}, result["ratios"]) + at_most({"b": 2.0}, result["ratios"])'
+    text = BENCHMARK.replace("import at_least", "import at_least, at_most").replace("distance_of", "victor_purpura")
+    (folder / "fast.py").write_text(text.replace('at_least({"a": 3.0}, result["ratios"])', goals))
+    rounds = {} if spread is None else {"spread": {"a": spread}}
+    result = {"ratios": now, "machine": {"cores": 2}, "spread": {"a": [1.99, 2.0]} if spread else {}}
+    saved = {"ratios": was, "commit": "0123abc", "date": "2026-11-25", "machine": {"cpu": "one"}}
+    (folder / "results" / "fast.json").write_text(json.dumps(saved | rounds))
+    monkeypatch.setattr(_rounds, "alone", lambda name, quick: json.loads(json.dumps(result)))
+    monkeypatch.setattr("taxel_studies.commit.code_version", lambda *packages: "4567def")
+    out = call(capsys, "bench", "fast", "--results", folder / "results")[1]
+    head = f"  against the result before (commit 0123abc, 2026-11-25, one): {said} of {len(was)} ratios fell by"
+    assert head in out
+    assert len(out.split(head)[1].splitlines()) == said + 1
+
+
 JUDGED = (
     BENCHMARK.replace("distance_of", "victor_purpura")
     .replace(

@@ -16,7 +16,6 @@ from taxel._base.messages import escaped
 from taxel._base.text_lines import TextLines
 from taxel._core import DeviceError
 from taxel.array import Array
-from taxel.serial_ports import Port, ports
 from taxel.wire import Command, Registers
 
 __all__ = ["Cable", "Device", "Greeting", "Port", "ports"]
@@ -36,6 +35,53 @@ _WAIT_S, _FULL_S, _GREETING_S = 0.05, 0.005, 0.25
 #: Longest line of a board, bytes, and how many lines are kept.
 _LONGEST, _RECENT = 1024, 256
 _TEXT = bytes(range(0x20, 0x7F)) + b"\t\n\f\r"
+
+
+@dataclass(frozen=True)
+class Port:
+    """Name a serial port of the system.
+
+    Parameters
+    ----------
+    place : str
+        For example "COM3" or "/dev/ttyACM0", for `taxel.device.Cable` and `taxel.device.Device`.
+    kind : {"usb", "pci", "bluetooth", "other"}
+    product, maker, serial : str or None
+        The description of a USB device.
+    usb : (int, int) or None
+        Vendor and product numbers of a USB device.
+
+    Examples
+    --------
+    >>> Port("COM3", "usb", product="FT232R").place
+    'COM3'
+    """
+
+    place: str
+    kind: str
+    product: str | None = None
+    maker: str | None = None
+    serial: str | None = None
+    usb: tuple[int, int] | None = None
+
+
+def ports() -> list[Port]:
+    """Return the serial ports of the system, USB devices first.
+
+    Returns
+    -------
+    list of Port
+
+    Raises
+    ------
+    OSError : the system does not list its ports
+
+    Examples
+    --------
+    >>> all(port.place for port in ports())
+    True
+    """
+    return [Port(**port) for port in _core.serial_ports()]
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from taxel._base.header_table import HeaderTable, separator_of, text_of
 from taxel._base.messages import counted, escaped
 from taxel._base.times import SINCE_1970_US
 from taxel._core import ProblemError
+from taxel._event_table import are_of_bids, is_of_track, track, with_known_columns
 from taxel.clock import Clock
-from taxel.event_table import are_of_bids, is_of_track, track, with_known_columns
 from taxel.recorded import Recorded
 
 __all__ = [

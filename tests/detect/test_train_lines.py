@@ -31,9 +31,9 @@ def test_the_first_line_says_held_out_and_the_next_ones_how_each_label_scored(tm
     assert re.fullmatch(f"contact, neuron: {counts}(; runs)?", lines[1]), lines[1]
     assert re.fullmatch(f"lift, neuron: {counts}(; runs)?", lines[4]), lines[4]
     for line, label in zip(lines[2:6:3], ("contact", "lift"), strict=True):
-        assert re.fullmatch(
-            rf"{label}, plain rule: {counts}(; runs(, as the neuron may be better by chance)?)?", line
-        ), line
+        assert re.fullmatch(rf"{label}, plain rule: {counts}(; runs(, as the neuron's lead may be chance)?)?", line), (
+            line
+        )
     for line in lines[3:7:3]:
         assert re.fullmatch("  tuned on all: .* frames?", line), line
     moved = r"{} by (-\d\S*) ms \(median; largest -\d\S*\)"

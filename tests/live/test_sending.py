@@ -6,8 +6,7 @@ import socket
 import time
 from pathlib import Path
 
-import numpy as np
-from loopback import free_port, until
+from loopback import free_port
 from shell import run, run_beside
 
 import taxel
@@ -17,24 +16,6 @@ from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 LONG_BEFORE_ANY = {"guard_frames": 1e6}
 KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "reported_us", "reported_ns"}
-
-
-def test_what_a_source_takes_arrives(tmp_path: Path) -> None:
-    """Whole values and floats, as a grid or flat, up to the greatest that its bits can hold."""
-    array = taxel.Array(2, 3)
-    for bits in (1, 12, 16):
-        record, most = tmp_path / f"{bits}.mcap", 2**bits - 1
-        pushed = [np.full((2, 3), most), np.zeros(6), np.arange(6, dtype=np.uint16).reshape(2, 3) % 2 * most]
-        with Live(0, host=LOOPBACK, array=array, record=record) as live:
-            to = f"{LOOPBACK}:{live.address[1]}"
-            source = taxel.live.Source(array, 100.0, bits=bits, noise_floor=0, to=to)
-            sent = sum(source.push(frame) for frame in pushed)
-            until(lambda sent=sent: live.counters["events"] == sent)
-        events, shown = taxel.open(record).events, np.zeros((2, 3), int)
-        for frame, t in zip(pushed, np.unique(events.t), strict=True):
-            now = events[events.t == t]
-            shown[now.y, now.x] = now.intensity
-            np.testing.assert_array_equal(shown, frame.reshape(2, 3).astype(int) >> source.shift)
 
 
 def listen(send: object, record: Path) -> Live:

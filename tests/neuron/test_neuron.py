@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from draws import mixed
+from interrupts import ctrl_c_after
 from plain_neuron import Plain
 from refusal import refused
 
@@ -104,3 +105,40 @@ def test_an_input_at_a_crossing_to_rounding_comes_too_late_to_stop_it(kernel: st
     for early in (1e-8, 9e-7, 1e-5):
         stopped = SpikeTrains.from_lists([[0.0], [crossing - early]], stop=60.0)
         assert len(neuron.run([1.2, -3.0], stopped)) == 0
+
+
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_each_neuron_fires_as_it_does_by_itself(time: str, dtype: type) -> None:
+    rng = np.random.default_rng(3)
+    trains = SpikeTrains.from_lists([np.sort(rng.uniform(-5, 500.0, 10)) for _ in range(100)], -5.0, 500.0)
+    weights = rng.normal(0.02, 0.1, (40, 100)).astype(dtype)
+    neuron = Neuron(time=time)
+    many = neuron.run_many(weights, trains, threshold=0.9)
+    assert (len(many), many.start, many.stop) == (40, trains.start, trains.stop)
+    assert (many.counts > 0).sum() > 20
+    for row, fired in zip(weights, many, strict=True):
+        assert np.array_equal(fired, neuron.run(row, trains, threshold=0.9))
+
+
+TRAINS, SPIKES = 100, 200_000
+WEIGHTS = np.full(TRAINS, 1e-3)
+CALLS = {
+    "run": lambda given: Neuron().run(WEIGHTS, given),
+    "run on a grid": lambda given: Neuron(time="grid").run(WEIGHTS, given),
+    "run_many": lambda given: Neuron().run_many(np.full((64, TRAINS), 1e-3), given),
+    "potential": lambda given: Neuron().potential(WEIGHTS, given, np.linspace(0, SPIKES * 10.0, 20_000_000)),
+}
+
+
+@pytest.fixture(scope="module")
+def given() -> SpikeTrains:
+    """Every train has a spike in each stretch of 10 ms: sorting them by time is much of the work."""
+    return SpikeTrains.from_lists([np.arange(SPIKES) * 10.0 + n * 0.0999 for n in range(TRAINS)], stop=SPIKES * 10.0)
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_control_c_answers_soon(name: str, given: SpikeTrains) -> None:
+    # Half a second is the goal, and .15 to .27 s was measured; a loaded machine needs more.
+    with ctrl_c_after(0.3, answered_within=2):
+        CALLS[name](given)

@@ -172,3 +172,24 @@ def test_a_region_keeps_its_part_of_places_and_both_pitches() -> None:
     y, x = np.indices((4, 3), dtype=float)
     part = Frames(values, [0], array=Array(4, 3, places=Places(x, y))).region(slice(1, 3), slice(2, 4)).array
     assert part.places == Places(x[2:4, 1:3], y[2:4, 1:3])
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 4), st.integers(1, 4), st.booleans()), min_size=1, max_size=4), st.integers(0, 2)
+)
+def test_arrays_side_by_side_are_the_parts_of_one(sizes: list[tuple[int, int, bool]], gap: int) -> None:
+    draw = np.random.default_rng(len(sizes))
+    arrays = []
+    for rows, columns, named in sizes:
+        exists = draw.random((rows, columns)) < 0.7
+        exists[0, 0] = True
+        names = [f"{k}" for k in range(rows * columns)] if named else None
+        arrays.append(Array(rows, columns, 2.0, exists, "a", names=names))
+    beside, lefts = Array._beside(arrays, gap)
+    assert beside.taxels == sum(array.taxels for array in arrays)
+    assert beside.columns == sum(array.columns for array in arrays) + gap * (len(arrays) - 1)
+    for left, array in zip(lefts, arrays, strict=True):
+        part = beside._part(slice(left, left + array.columns), slice(0, array.rows))
+        assert part.fits(array)
+        assert (part.pitch_mm, part.name) == (2.0, "a")
+        assert part.names in (array.names, ("",) * array.rows * array.columns)

@@ -33,7 +33,7 @@ from tests.panel.protocol import word
 
 import taxel
 from taxel.detect import Example, fit
-from taxel.simulate import Replay, emulate
+from taxel.simulate import Board, Replay, emulate
 from taxel.wire import Registers
 
 __all__ = ["live", "page", "recording", "replay"]
@@ -82,24 +82,29 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
 
 def test_what_does_not_arrive_is_said(chromium: Any, tmp_path: Path) -> None:
     port = free_port()
-    source = taxel.live.Source(taxel.Array(4, 4), 500.0, bits=12, to=f"127.0.0.1:{port}")
-    given = {"array": source.array, "registers": source.registers}
-    with followed(chromium, tmp_path, port, **given) as (_, page):
+    array = taxel.Array(4, 4)
+    registers = Registers._of_source(array, 500.0, 12)[0].replace(noise_floor=3)
+    board, given = Board(registers, array), {"array": array, "registers": registers}
+
+    def push(value: int) -> None:
+        for datagram in board.frame(np.full(16, value)):
+            sender.sendto(datagram, ("127.0.0.1", port))
+
+    with followed(chromium, tmp_path, port, **given) as (_, page), socket.socket(type=socket.SOCK_DGRAM) as sender:
         shows(page, "silence", rf"^Nothing has arrived at UDP 127\.0\.0\.1:{port} so far")
         shows(page, "state-word", "^Nothing arrives$")
         shows(page, "frames", "^–$")
         # Version 1 has no heartbeats: quiet.
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
-            board.sendto(word(1_000_000, 1, 1, 50), ("127.0.0.1", port))
+        sender.sendto(word(1_000_000, 1, 1, 50), ("127.0.0.1", port))
         shows(page, "silence", r"^Quiet: nothing has arrived for .*, since 1\.000 s by the clock of the board")
         shows(page, "state-word", "^Quiet$")
         # Version 2 sends them: lost.
         for k in range(200):
-            source.push(np.full((4, 4), 100 if k < 20 else 300))
+            push(100 if k < 20 else 300)
             time.sleep(0.002)
 
         def shown() -> bool:
-            source.push(np.full((4, 4), 300))
+            push(300)
             return bool(page.locator("#frames").inner_text() == "500")
 
         until(shown, "the frames of a board that sends")

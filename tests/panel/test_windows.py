@@ -127,7 +127,7 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         assert answer["labels"] == ["contact", "lift"]
         found = answer["detections"]
         assert [one["label"] for one in found] == ["contact", "lift"] * 6
-        assert page.ask("train")["reason"].count("names no event")
+        assert page.ask("train")["reason"].count("is a label")
         page.ask("live")
         address = live.address
         # The board: first something must be held that can be its rest.

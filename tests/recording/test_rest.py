@@ -10,8 +10,10 @@ import pytest
 from shell import run
 
 import taxel
+from taxel import Array, Frames, Tare
 from taxel.recording.analysis.pressure import above_rest, series
-from taxel.recording.analysis.quiet import by_unit
+from taxel.recording.analysis.quiet import TOUCH, by_unit, standing, touched
+from taxel.recording.analysis.rest import of_frames
 
 
 def sent(frames: taxel.Frames) -> taxel.Events:
@@ -104,7 +106,7 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
     tmp_path: Path, events: bool, until_s: float
 ) -> None:
     source, _ = preloaded(until_s=until_s, events=events)
-    path, where = tmp_path / "a.npz", "something was on rows 2 to 4, columns 5 to 7 (up to 4"
+    path, where = tmp_path / "a.npz", "rows 2 to 4, columns 5 to 7 (up to 4"
     taxel.convert(source, path)
     assert where in run("info", path).stdout
     taken = taxel.tasks.rest(taxel.open(path))
@@ -142,3 +144,50 @@ def test_the_noise_of_pressures_is_their_deviation_also_where_a_sensor_cuts_off_
     assert not tare.rest.any()
     assert tare.noise[0, 0] == 0
     assert np.quantile(tare.noise, 0.5) == pytest.approx(sigma, rel=0.2)
+
+
+HZ = 50
+
+
+def walked(seed: int, shape: tuple[int, int], *, noise: float = 0.5, step: float = 0.25) -> taxel.Frames:
+    """Return 12 s in N, touched again and again on all taxels, in steps of the sensor, cut off at 0."""
+    random = np.random.default_rng(seed)
+    values = noise * random.standard_normal((12 * HZ, *shape))
+    for begin in range(HZ // 2, 12 * HZ - HZ, HZ):
+        values[begin : begin + HZ // 2] += random.uniform(20, 60, shape)
+    t = np.arange(len(values)) * (1_000_000 // HZ)
+    return taxel.Frames(np.maximum(step * np.round(values / step), 0), t, unit="N", array=taxel.Array(*shape))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_lies_on_a_mat_from_beginning_to_end_is_found(seed: int) -> None:
+    frames = walked(seed, (8, 10))
+    assert standing(frames) == ""
+    random, values = np.random.default_rng(seed), frames.values.copy()
+    values[:, 1:4, 5:9] += random.uniform(8, 12, (3, 4))
+    lying = taxel.Frames(values, frames.t, unit="N", array=frames.array)
+    assert standing(lying).startswith("rows 1 to 3, columns 5 to 8 (up to 1")
+    assert standing(lying).endswith(" N in every frame)")
+
+
+SHAPES = [(1, 1), (1, 4), (1, 16), (4, 4), (10, 12), (60, 80)]
+WINDOWS_US = [5000, 20_000]
+
+
+def drawn(shape: tuple[int, int], mean: float, seed: int, window_us: int) -> Frames:
+    """Draw 300 frames of Poisson noise."""
+    values = np.random.default_rng(seed).poisson(mean, (300, *shape)).astype(float)
+    return Frames(values, window_us * np.arange(300), unit=f"events/{window_us / 1000:g} ms", array=Array(*shape))
+
+
+@pytest.mark.parametrize("window_us", WINDOWS_US)
+@pytest.mark.parametrize("mean", [0.01, 0.05, 0.2, 1.0, 7.0, 50.0])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_noise_is_quiet_and_no_touch_at_any_rate(shape: tuple[int, int], mean: float, window_us: int) -> None:
+    for seed in range(1 if shape[0] > 20 else 4):
+        frames = drawn(shape, mean, seed, window_us)
+        rest = of_frames(frames)
+        assert (rest.source, rest.falls, rest.preload_at) == ("quiet", False, "")
+        for count in (25, 115, 250):
+            tare = Tare.take(frames, stop_us=window_us * count)
+            assert touched(frames, tare) < TOUCH

@@ -19,10 +19,9 @@ from taxel.cli.app import OUTSIDE, WRONG_INPUT, Limits
 from taxel.cli.console import Console
 from taxel.detect import load
 from taxel.live import Summary
-from taxel.live._stated_options import StatedOptions
+from taxel.live.options import LiveOptions
 from taxel.tare import Tare, seconds_of
 from taxel.verdict import in_words
-from taxel.wire import Registers
 from taxel.wire.registers import QUOTED_PRESETS
 
 __all__ = ["REDRAW_S", "counters_line", "exit_code", "for_live", "received", "with_live_options"]
@@ -35,27 +34,13 @@ _ALWAYS_S = 1e9
 REDRAW_S = 0.1
 
 
-RateOption = Annotated[
-    float | None,
-    Parameter(
-        validator=Limits(0.0),
-        help="Frames per second of your own sensor, if taxel.live.Source sends its events. Give --bits too: both set "
-        "the same registers as the Source.",
-    ),
-]
-BitsOption = Annotated[
-    int | None,
-    Parameter(validator=Limits(1, 16), help="With --rate-hz: bits of the sensor's values, as given to the Source."),
-]
-
-
 #: Types of options of `Live` that are typed as they are.
 _TYPES = {"int": int, "float": float, "bool": bool, "str": str}
 
 
 def _typed(field: Field[Any]) -> tuple[str, Any, Any]:
     """Return an option of `Live` as a field that the command line types: its name, kind and default."""
-    words, kind, described = field.metadata["typed"], str(field.type), about(StatedOptions, field.name)
+    words, kind, described = field.metadata["typed"], str(field.type), about(LiveOptions, field.name)
     help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
     plain = kind.removesuffix(" | None")
     default = field.default if plain in _TYPES else None
@@ -84,7 +69,7 @@ def with_live_options(command: str) -> Callable[[Callable[..., Any]], Callable[.
         The command whose options these are.
     """
     chosen = [
-        field for field in fields(StatedOptions) if command in field.metadata["typed"].get("commands", "live").split()
+        field for field in fields(LiveOptions) if command in field.metadata["typed"].get("commands", "live").split()
     ]
     # A class of `types` would be taken for a value.
     options = make_dataclass("LiveOptions", map(_typed, chosen), frozen=True, namespace={"__module__": __name__})
@@ -97,9 +82,7 @@ def with_live_options(command: str) -> Callable[[Callable[..., Any]], Callable[.
     return decorate
 
 
-def for_live(
-    typed: Any, rate_hz: float | None = None, bits: int | None = None, seconds: float | None = None
-) -> dict[str, Any]:
+def for_live(typed: Any, seconds: float | None = None) -> dict[str, Any]:
     """Return typed options as `Live` takes them: files are read.
 
     Each source of lines may be silent before its first line for `seconds`, by default as long as it takes.
@@ -107,27 +90,11 @@ def for_live(
     options: dict[str, Any] = vars(typed)
     readout, size = options.get("readout"), options["array"]
     trained = None if readout is None else load(readout)
-    # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
-    array = None if size is None else of_size(size, of_wire=rate_hz is None)
-    sensor = trained.array if array is None and trained is not None else array
-    registers = _registers(options["registers"], rate_hz, bits, sensor)
-    read = {"readout": trained, "array": array, "registers": registers, "tare": _rest(options.get("tare"))}
+    array = None if size is None else of_size(size)
+    read = {"readout": trained, "array": array, "tare": _rest(options.get("tare"))}
     first_line_s = _ALWAYS_S if seconds is None else max(_FIRST_LINE_S, seconds)
     given = {"send": options.get("send") or (), "sources": options["sources"] or None, "first_line_s": first_line_s}
     return options | read | given
-
-
-def _registers(
-    preset: str | None, rate_hz: float | None, bits: int | None, array: Array | None
-) -> str | Registers | None:
-    """Return the registers that the options state, of a sensor of this array; None if they state none."""
-    if rate_hz is None and bits is None:
-        return preset
-    if rate_hz is None or bits is None:
-        raise ProblemError("--rate-hz and --bits: give both, with the values of the taxel.live.Source that sends")
-    if preset is not None:
-        raise ProblemError("--rate-hz and --preset are both given, and both state the registers: give only one of them")
-    return Registers._of_source(Array._of(array), rate_hz, bits)[0]
 
 
 def say_waiting(options: dict[str, Any], console: Console) -> None:

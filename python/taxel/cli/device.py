@@ -16,9 +16,8 @@ from taxel.board_check import check_board
 from taxel.cli._say import say
 from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits
 from taxel.cli.console import Console
-from taxel.device import Device
+from taxel.device import Device, ports
 from taxel.live.sending import PORT
-from taxel.serial_ports import ports
 from taxel.wire import PRESETS, Registers, described
 from taxel.wire.registers import QUOTED_PRESETS
 

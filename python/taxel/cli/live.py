@@ -25,8 +25,6 @@ from taxel.cli._task import Output
 from taxel.cli.app import App, Flat, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
-    BitsOption,
-    RateOption,
     counters_line,
     doubts,
     exit_code,
@@ -71,8 +69,6 @@ class _LiveArguments:
         With --panel: the folder of the recordings. Default: the current folder.
     """
 
-    rate_hz: RateOption = None
-    bits: BitsOption = None
     control: str | None = None
     seconds: SecondsOption = None
     report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
@@ -101,7 +97,7 @@ def live(*, options: Any, typed: Flat[_LiveArguments] = _LiveArguments()) -> int
     Example: taxel live --panel --control 127.0.0.1:5209
     """
     _check_options(options, typed)
-    options = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
+    options = for_live(options, typed.seconds)
     trained, rest, record, lines = (options[name] for name in ("readout", "tare", "record", "lines"))
     if typed.control is not None and not typed.panel and not isinstance(rest, float):
         raise ProblemError("--control needs a fresh tare or the panel: give --tare SECONDS, or --panel")
@@ -168,7 +164,7 @@ def _say_of_board(trained: Readout | PlainRule, pipeline: Live, console: Console
     elif board.get("frame_us", registers.frame_us) != registers.frame_us:
         differing = (
             f"the readout was trained on frames of {plain(board['frame_us'])} us, and frames of "
-            f"{plain(registers.frame_us)} us are assumed: give --preset, or --rate-hz and --bits"
+            f"{plain(registers.frame_us)} us are assumed: give --preset"
         )
     else:
         differing = ""
@@ -303,7 +299,8 @@ def _watch(
     When a `fresh` tare is complete, `at_rest` is closed, and the panel gets the serial line, if `control` names it.
     """
     echo = _echo(pipeline, console)
-    console.print("\n".join(filter(None, (f"listening on {pipeline.place}; Ctrl-C ends", pipeline.read_as))))
+    for line in filter(None, (f"listening on {pipeline.place}; Ctrl-C ends", pipeline.read_as)):
+        console.print(line)
     # Lines that another thread writes would break a display.
     shown = Console(stderr=True, quiet=True) if echo is None else console
     display = Display(console=shown, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)

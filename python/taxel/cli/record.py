@@ -22,8 +22,6 @@ from taxel.cli._task import OutArgument
 from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
-    BitsOption,
-    RateOption,
     counters_line,
     doubts,
     exit_code,
@@ -60,8 +58,6 @@ class _RecordArguments:
         Automatic mode: number of trials. Default: until Ctrl-C.
     """
 
-    rate_hz: RateOption = None
-    bits: BitsOption = None
     seconds: SecondsOption = None
     markers: bool = False
     length: Annotated[float | None, Parameter(validator=Limits(0.001))] = None
@@ -104,7 +100,7 @@ def record(
         raise ProblemError("--trials needs --length, the length of each trial: give both")
     if typed.length is not None and typed.seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
-    live = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
+    live = for_live(options, typed.seconds)
     console = Console(stderr=True)
     say_waiting(live, console)
     if typed.length is None:

@@ -16,8 +16,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
-from taxel.spikes import SpikeTrains
-from taxel.spikes.trains import Kind
+from taxel.spikes import Kind, SpikeTrains
 from taxel.tare import Tare
 
 

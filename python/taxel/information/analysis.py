@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from taxel._base.arguments import callback, instance, integer, several
 from taxel._base.parallel import HERE, Workers
 from taxel.encode import ChangeEvents
-from taxel.information._threads import threads
 from taxel.information.answers import Answer, Control, Point, is_above_chance
 from taxel.information.estimate import zero_test
 from taxel.information.keeping import keeps
-from taxel.information.nested import WORTH_THREADS, Matrices, predictions
+from taxel.information.nested import WORTH_THREADS, Matrices, predictions, threads
 from taxel.information.question import Question
 from taxel.information.sampling import SampledEvents
 from taxel.information.trials import LabelledTrial

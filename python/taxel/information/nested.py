@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from taxel._base.arguments import integer, numbers, several, shown
 from taxel._base.errors import refused
-from taxel.information._threads import threads
 from taxel.information.dual import LARGEST_RIDGE, Regressions, gram_matrix, residual
 from taxel.information.folds import Split, split
 
@@ -204,3 +205,13 @@ class _Discriminants:
         """Return all ways' predictions of trials that are left out; shapes (cases, trials), (ways, cases, trials)."""
         number = np.repeat(np.arange(self.count), len(out))
         return self.predict(number, np.tile(out, (self.count, 1))).reshape(self.count, *out.shape)
+
+
+__all__ = ["threads"]
+
+
+def threads(*, several: bool) -> threadpool_limits:
+    """Limit NumPy and SciPy to one thread until the context ends, unless several are worth their cost."""
+    # SciPy has a separate pool of threads, which can be limited only after it is loaded.
+    import_module("scipy.linalg")
+    return threadpool_limits(None if several else 1)

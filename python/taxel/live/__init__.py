@@ -2,14 +2,12 @@
 
 from taxel.live.live import Live
 from taxel.live.sending import PORT, send
-from taxel.live.source import Source
 from taxel.live.summary import Summary
 from taxel.live.summary import delays as delays
 
 __all__ = [
     "PORT",
     "Live",
-    "Source",
     "Summary",
     "send",
 ]

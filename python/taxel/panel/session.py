@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from taxel import _core
 from taxel._base.errors import refused
 from taxel._core import ProblemError
+from taxel.device import ports
 from taxel.labels import Note
 from taxel.live.lines import preview
 from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
@@ -26,7 +27,6 @@ from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
 from taxel.panel.shown_files import judged
 from taxel.panel.threads import in_thread
-from taxel.serial_ports import ports
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection

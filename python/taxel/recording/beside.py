@@ -12,7 +12,7 @@ from taxel._base.files import named
 from taxel._base.table_text import Text
 from taxel._base.times import SINCE_1970_US
 from taxel._core import FormatError
-from taxel.event_table import are_of_events, is_of_track
+from taxel._event_table import are_of_events, is_of_track
 from taxel.labels import Labels, Note, ahead_us, beside, trial_of
 from taxel.recording.readers.csv import names_in
 from taxel.recording.recording import Recording

@@ -39,9 +39,9 @@ from taxel.recording.kinds import (
     refuse_empty,
     unknown,
 )
-from taxel.recording.layout import apply_layout
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView
+from taxel.recording.stated import apply_layout
 
 
 @with_fields_of(OpenOptions)

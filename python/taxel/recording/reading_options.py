@@ -12,9 +12,9 @@ from taxel._base.errors import refused
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout, layout_name
 from taxel.recording.kinds import GivenLayout, files_in, is_folder, kind_of
-from taxel.recording.layout import is_row_of, on_array
 from taxel.recording.opening import open_all
 from taxel.recording.recording import Recording
+from taxel.recording.stated import is_row_of, on_array
 
 
 def open_trials(

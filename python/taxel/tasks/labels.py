@@ -48,9 +48,11 @@ def given_labels(
     """
     events = references(source, recordings, argument)
     if not any(events):
+        titles = titles_of(recordings)
+        if source == "notes":
+            raise helped(ProblemError(f"no note of {titles} is a label"), argument, "give")
         names = table_names(source) if are_tables(source) else "given as times"
-        error = refused(argument, f" is {names}: names no event in {titles_of(recordings)}")
-        raise helped(error, argument, "give") if source == "notes" else error
+        raise refused(argument, f" is {names}: names no event in {titles}")
     for recording, of_recording in zip(recordings, events, strict=True):
         for label, times in of_recording.items():
             again = int(np.count_nonzero(np.diff(times) < _NEAR_US))

@@ -176,7 +176,7 @@ class Training:
             yield f"left out, because no row of labels names this source: {', '.join(self.unlabelled)}"
         for label, ms in self.constants_ms.items():
             side = "after" if ms > 0 else "before"
-            yield f"{label}: labels are {abs(ms):.0f} ms {side} what was felt, which is taken off them and off t"
+            yield f"{label}: labels are {abs(ms):.0f} ms {side} what was felt; labels and t are corrected by it"
         yield from self._aligned()
         if self.options.shift_ms:
             yield f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)"
@@ -236,7 +236,7 @@ class Training:
         else:
             when = "when the touch ends" if rule.age_ms == "end" else ""
             better = self.scored.neurons[label].rank[0] < plain.together[label].rank[0]
-            runs = _RUNS + ", as the neuron may be better by chance" * better
+            runs = _RUNS + ", as the neuron's lead may be chance" * better
             yield _line(label, "plain rule", plain.together[label], when) + runs * by_rule
             yield f"  tuned on all: {rule._compared()}"
         if plain.own is not None and (own := plain.own[0][label]) is not None:

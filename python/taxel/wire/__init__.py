@@ -4,12 +4,10 @@ Version 1 is the thesis' (Appendix 1, sections 3 to 5). Version 2 is ours, and e
 *Wire version 2*).
 """
 
-from taxel.wire.command import Command
 from taxel.wire.counts import Counts, Received, Status
-from taxel.wire.decoder import Decoder, decode
+from taxel.wire.decoder import Decoder, StreamReader, decode
 from taxel.wire.encode import encode
-from taxel.wire.registers import FRAME_US, PRESETS, Registers, described
-from taxel.wire.stream import StreamReader
+from taxel.wire.registers import FRAME_US, PRESETS, Command, Registers, described
 
 __all__ = [
     "FRAME_US",

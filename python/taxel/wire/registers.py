@@ -1,19 +1,19 @@
-"""The board's registers: sets, presets and rules (thesis, Appendix 1, Table 5.5)."""
+"""The board's registers: sets, presets, rules, and the commands that set one (thesis, Appendix 1, Tables 5.1, 5.5)."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, instance, integer, several, shown, text
+from taxel._base.arguments import buffer_bytes, finite, flag, instance, integer, several, shown, text
 from taxel._base.errors import refused
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
-from taxel.wire.command import Command
 
 #: The names of the presets (`Registers.preset`).
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
@@ -27,6 +27,78 @@ _FIELDS: dict[str, Any] = {field["name"]: field for field in _core.registers_fie
 _TIMES = tuple(name for name, field in _FIELDS.items() if field["unit"] == "10 ns")
 _FLAGS = tuple(name for name, field in _FIELDS.items() if field["unit"] == "flag")
 _MANUAL = {field["manual"]: name for name, field in _FIELDS.items() if field["manual"] != name}
+
+
+@dataclass(frozen=True)
+class Command:
+    """Set one of the board's 32-bit registers: five bytes on the serial line (Table 5.1).
+
+    Parameters
+    ----------
+    register : int, 0 to 7
+    value : int, 0 to 2**32 - 1
+        The whole register.
+
+    Raises
+    ------
+    ProblemError : a register or a value out of these ranges
+
+    Notes
+    -----
+    Thesis, Appendix 1, Table 5.1.
+
+    Examples
+    --------
+    >>> Command(1, 300).to_bytes().hex()
+    '900000012c'
+    >>> Command.from_bytes(bytes.fromhex("900000012c"))
+    Command(register=1, value=300)
+    """
+
+    register: int
+    value: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "register", integer("register", self.register, 0, 7))
+        object.__setattr__(self, "value", integer("value", self.value, 0, 2**32 - 1))
+
+    def to_bytes(self) -> bytes:
+        """Return the five bytes.
+
+        Returns
+        -------
+        bytes, 5
+
+        Examples
+        --------
+        >>> list(Command(7, 1).to_bytes())
+        [240, 0, 0, 0, 1]
+        """
+        return _core.command_bytes(self.register, self.value)
+
+    @classmethod
+    def from_bytes(cls, data: Any) -> Command:
+        """Read five bytes.
+
+        Parameters
+        ----------
+        data : bytes, or anything with a contiguous buffer
+
+        Returns
+        -------
+        Command
+
+        Raises
+        ------
+        ProblemError : `data` is not bytes
+        FormatError : not five bytes, or a byte whose top bit is wrong (names the byte)
+
+        Examples
+        --------
+        >>> Command.from_bytes(Command(4, 140).to_bytes()).value
+        140
+        """
+        return cls(*_core.command_read(buffer_bytes(data)))
 
 
 class Registers:

@@ -18,7 +18,7 @@ export function writeCounters(counters) {
   // The rate follows from the registers, so it says nothing of a board that is off.
   const arrives = counters.arrival.state === "arriving";
   put("frames", number(arrives ? counters.frames_per_s : null, integer));
-  entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "unknown: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers state ${integer(counters.frames_per_s)}/s`);
+  entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "unknown: give --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers state ${integer(counters.frames_per_s)}/s`);
   // What the kernel does not count may be more.
   put("lost", lost.by_kernel_known ? integer(lost.number) : lost.number > 0 ? `${integer(lost.number)} or more` : "unknown");
   part("lost-block", HTMLElement).classList.toggle("bad", lost.number > 0);

@@ -2,7 +2,7 @@
 // what the cursor says come from the entry.
 
 import { make, part, themed, write } from "./dom.js";
-import { movable } from "./layout.js";
+import { movable } from "./arrangement.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { Raster } from "./raster.js";
 import uPlot from "./vendor/uPlot.js";

@@ -9,7 +9,7 @@ import { make, part, write } from "./dom.js";
 import { showKeys } from "./keys.js";
 import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
-import { arrangeForWidth, divide } from "./layout.js";
+import { arrangeForWidth, divide } from "./arrangement.js";
 import { Maps } from "./maps.js";
 import { Mistakes } from "./mistakes.js";
 import { Notes } from "./notes.js";

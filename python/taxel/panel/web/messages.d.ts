@@ -233,7 +233,7 @@ export interface Registers {
   type: "registers";
   /** False: they were not read from the board; they are the preset that was named on the command line, or what the board held before a reset (a new session of version 2, or its greeting on the serial line), until they are read again, which is at once. */
   known: boolean;
-  /** Whether they were stated at the start (`--preset`, or `--rate-hz` with `--bits`). */
+  /** Whether they were stated at the start (`--preset`). */
   stated: boolean;
   /** Every field of `presets` in its unit; those of one bit are true or false. */
   values: Record<string, boolean | number>;

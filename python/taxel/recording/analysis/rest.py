@@ -129,7 +129,7 @@ class Rest:
             "quiet": f"its first quiet stretch, {first} to {end} s",
             "none": f"unknown, because {_WHY}; to set the rest, give a tare",
         }[self.source]
-        text += f"; something was on {self.preload_at} then, which is taken off" * bool(self.preload_at)
+        text += f"; {self.preload_at} were loaded then, and that load is subtracted" * bool(self.preload_at)
         if self.falls and turned is not None:
             text += "; values fall from their rest after a layout inverted them: if the values need no inversion, "
             text += "remove the line 'falls = ...' from it"

@@ -86,8 +86,6 @@ def read_columns(path: Path, array: Array | None = None) -> InMemory:
     names = _OF_FRAMES if are_frames else _OF_EVENTS
     required = ("values", "number" if "number" in found else "t") if are_frames else EVENTS
     missing = next((name for name in required if name not in found), None)
-    if "about" in found and SENSOR not in found:
-        raise FormatError(f"{path}: was written by an earlier version of taxel; write it anew from its recording")
     if missing is not None:
         raise FormatError(
             f"{path}: {missing} is missing; must contain t, x, y, p (events) or values, t (frames), but contains "

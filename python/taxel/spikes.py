@@ -1,11 +1,11 @@
-"""Spike times by train."""
+"""Spike times by train, ms, and their conversion from and to us, the unit of the wire and of events."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,8 @@ from taxel._core import ProblemError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+__all__ = ["SpikeTrains", "to_ms", "to_us"]
 
 Kind = Literal["unsigned", "signed", "graded"]
 _KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -562,3 +564,21 @@ def _kind(kind: object, values: NDArray[np.float32] | None) -> Kind:
     if not isinstance(kind, str) or kind not in _KINDS:
         raise refused("kind", f" is {shown(kind)}: must be one of {', '.join(_KINDS)}")
     return kind
+
+
+@overload
+def to_ms(us: float | np.integer[Any]) -> float: ...
+@overload
+def to_ms(us: NDArray[Any]) -> NDArray[np.float64]: ...
+def to_ms(us: Any) -> Any:
+    """Convert times of the wire, us, to the unit of neurons, ms."""
+    return us / 1000.0
+
+
+@overload
+def to_us(ms: float) -> float: ...
+@overload
+def to_us(ms: NDArray[Any]) -> NDArray[np.float64]: ...
+def to_us(ms: Any) -> Any:
+    """Convert times of neurons, ms, to the unit of the wire, us, without rounding."""
+    return ms * 1000.0
