@@ -107,14 +107,30 @@ def test_a_layout_of_the_unit_alone_leaves_the_times(tmp_path: Path) -> None:
     assert (found.layout.unit, found.layout.data.time, found.layout.data.time_unit) == ("kPa", "time", "s")
 
 
-def test_each_trial_is_a_source_and_each_axis_too(tmp_path: Path) -> None:
+def test_each_trial_is_a_recording_and_each_axis_a_source(tmp_path: Path) -> None:
     numbers = np.arange(2 * 5 * 4 * 3, dtype=np.float32).reshape(2, 5, 4, 3)
     np.save(tmp_path / "a.npy", numbers)
-    found = opened(tmp_path / "a.npy", 'axis = "z"\n[data]\naxes = "trial time taxel axis"\n')
-    assert list(found.sources) == ["trial1", "trial2"]
-    np.testing.assert_array_equal(values(found, "trial2")[:, 0], numbers[1, :, :, 2])
-    found = opened(tmp_path / "a.npy", 'axis = "all"\n[data]\naxes = "trial time taxel axis"\n')
-    assert list(found.sources) == [f"trial{k}_{axis}" for k in (1, 2) for axis in "xyz"]
+    layout = tmp_path / "a.layout.toml"
+    layout.write_text('axis = "all"\n[data]\naxes = "trial time taxel axis"\n')
+    for k, recording in enumerate(taxel.open_all(tmp_path / "a.npy")):
+        assert (recording.name, list(recording.sources)) == (f"trial{k + 1}", ["x", "y", "z"])
+        np.testing.assert_array_equal(recording.sources["z"].frames().values[:, 0], numbers[k, :, :, 2])
+
+
+@pytest.mark.parametrize("above", ["data/demo_", "episode", "runs/a/"])
+def test_numbered_groups_are_trials(above: str, tmp_path: Path) -> None:
+    """As robots' episodes are kept; also where one of them has more arrays, or more frames."""
+    random = np.random.default_rng(1)
+    of_each = {k: random.random((30 + k, 2, 3)).astype(np.float32) for k in (0, 2, 10)}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k, frames in of_each.items():
+            file[f"{above}{k}/obs/tactile"], file[f"{above}{k}/obs/time_s"] = frames, np.arange(len(frames)) / 50
+        file[f"{above}0/remark"] = np.zeros(3)
+    found = taxel.open_all(tmp_path / "a.h5")
+    assert [each.name for each in found] == [f"{above.rpartition('/')[2]}{k}" for k in of_each]
+    for recording, frames in zip(found, of_each.values(), strict=True):
+        np.testing.assert_array_equal(recording.frames().values, frames)
+        assert np.diff(recording.frames().t).tolist() == [20_000] * (len(frames) - 1)
 
 
 def test_three_axes_at_the_end_are_asked(tmp_path: Path) -> None:
