@@ -314,7 +314,9 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what frames lack: values and times."""
+    """Yield what frames lack: values and times, and new values."""
+    if (rate := facts["values_per_s"]) and facts["frames_per_s"] > 1.5 * rate:
+        yield "repeated values", f"frames repeat their values, which change at {rate:.3g} Hz at most: the sensor's rate"
     if facts["missing"]["values"]:
         yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
     if (gaps := facts["gaps"]) is not None and "gaps" not in facts["verdict"].noted:

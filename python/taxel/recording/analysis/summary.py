@@ -12,6 +12,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series
+from taxel.recording.frames import value_us
 from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
@@ -60,6 +61,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     else:
         facts["frames"], facts["unit"] = len(table), table.unit
         facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
+        facts["values_per_s"] = 1e6 / value_us(table) if seconds else None
         facts["missing"] = {"values": table.missing, "of": table.values.size}
     gaps = recording._gaps
     facts["gaps"] = None if gaps is None else gaps.to_dict()
