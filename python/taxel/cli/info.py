@@ -285,6 +285,8 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         if facts.get("on_share") is not None:
             words = f"{100 * facts['on_share']:.1f} % on"
         yield "events", f"{facts['events']}, {words}"
+        if facts["bursts_us"]:
+            yield "resolution", f"times come in bursts {facts['bursts_us'] / 1e3:.3g} ms apart, and are no finer"
     else:
         yield ("samples" if "columns" in facts else "frames"), f"{facts['frames']} ({facts['unit']})"
         yield from _flaws(facts)

@@ -438,8 +438,10 @@ def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | N
     """Return the events of a table with a line each."""
     names = [form.names[k].lower() for k in form.taxels]
     names = [EVENT_COLUMNS.get(name, name) for name in names]
-    if sorted(names) != ["p", "x", "y"]:
-        raise unreadable(f"the columns other than the time are {', '.join(names)}; must be x, y, p for events", path)
+    right = ({"x", "y"}, {"taxel"}), ({"p"}, {"is_negative"})
+    if {*names} not in [place | rises for place in right[0] for rises in right[1]]:
+        wrong = f"the columns other than the time are {', '.join(names)}"
+        raise unreadable(f"{wrong}; must be x, y, p, or taxel, p, for events", path)
     try:
         return events_of(path, form, names, rows, array if layout.rows is None else layout.array(1))
     except ProblemError as error:
@@ -456,7 +458,7 @@ def events_of(
     path : Path
     form : Form
     names : sequence of str
-        Of the columns but the time: x, y, p, and perhaps intensity and repaired.
+        Of the columns but the time: x and y, or the taxel; p, or is_negative; and perhaps intensity and repaired.
     rows : Rows
     array : Array, optional
         Default: one large enough.
@@ -469,6 +471,11 @@ def events_of(
     ProblemError : events outside the array
     """
     by_name = dict(zip(names, rows.values.T, strict=True))
+    if (taxel := by_name.pop("taxel", None)) is not None:
+        array = array or Array(1, 1 + int(np.nanmax(taxel, initial=0)))
+        by_name["y"], by_name["x"] = np.divmod(taxel, array.columns)
+    if (falls := by_name.pop("is_negative", None)) is not None:
+        by_name["p"] = 1 - falls
     present = ~np.isnan(by_name["intensity"]) if "intensity" in by_name else None
     for name, column in by_name.items():
         least, most = _EVENTS[name]

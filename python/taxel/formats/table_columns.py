@@ -32,8 +32,9 @@ _BLOCKS = 64
 _SERIES = 4
 #: A number with other text behind it, which is no date, time or address.
 _GLUED = re.compile(r"[-+]?\d+(?:[.,]\d+)?[ \t]*[^\s\d:/.,-]")
-#: Names of the columns of events.
+#: Names of the columns of events: a place, or the number of a taxel, and whether it rises, or falls.
 EVENT_COLUMNS = {"col": "x", "column": "x", "row": "y", "pol": "p", "polarity": "p", "on": "p"}
+EVENT_COLUMNS |= dict.fromkeys(("address", "addr", "taxel_id"), "taxel")
 
 
 @dataclass
@@ -355,6 +356,8 @@ def by_key(draft: Draft, time: int | None, all_lines: Callable[[], Iterable[str]
     If each time has one reading of each key, these are the taxels of an array.
     """
     fit, called, taxels = draft.fit, draft.called, draft.taxels
+    if time is not None and _addresses(draft, time):
+        return
     grid = _grid(draft, taxels)
     keys = [] if draft.key is None and not grid else grid or [draft.key or 0]
     if not keys or draft.is_stated("by", "taxel_column", "leave_out", "keep"):
@@ -502,11 +505,13 @@ def are_events(draft: Draft, time: int | None) -> bool:
 
     The rate of events says nothing of the unit of their times, as that of frames does: without a name it is asked.
     """
+    addresses = [] if time is None else _addresses(draft, time)
+    draft.be("taxel", "", *addresses)
     fit, taxels, units = draft.fit, draft.taxels, ("us", "ms", "s")
     choices: dict[str, Changes]
     called = {EVENT_COLUMNS.get(name, name): k for k in taxels for name in [draft.names[k].lower()]}
     named = [called[name] for name in "xyp" if name in called]
-    if time is not None and len(taxels) == len(named) == 3 and _are_places(fit, named):
+    if time is not None and (addresses or (len(taxels) == len(named) == 3 and _are_places(fit, named))):
         draft.set(events=True)
         draft.answer("time_unit")
         if not draft.is_stated("time_unit") and not (
@@ -524,6 +529,17 @@ def are_events(draft: Draft, time: int | None) -> bool:
             draft.ask("frames or events", "events", choices, first=True)
             break
     return False
+
+
+def _addresses(draft: Draft, time: int) -> list[int]:
+    """Return the columns of the taxel and the polarity of events, if a table has only these beside the time."""
+    others = {draft.names[k].lower(): k for k in range(len(draft.names)) if k != time and k not in draft.stated_left}
+    called = {EVENT_COLUMNS.get(name, name): k for name, k in others.items()}
+    places = [called[name] for name in ("taxel", "p", "is_negative") if name in called]
+    if "taxel" not in called or not len(places) == len(others) == 2:
+        return []
+    is_number = all(draft.fit.types[k] == "number" for k in places)
+    return places if is_number and _are_places(draft.fit, [places[0], *places]) else []
 
 
 def _are_places(fit: Fit, columns: Sequence[int], polarities: int = 1) -> bool:

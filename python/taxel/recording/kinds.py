@@ -20,7 +20,7 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import emed, event_camera, lerobot, moticon, pedar, tekscan, xdf
+from taxel.formats import emed, event_camera, lerobot, moticon, neutouch, pedar, tekscan, xdf
 from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
@@ -42,7 +42,15 @@ from taxel.recording.readers.mcap import read_mcap
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
 GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
 #: Files of makers and of recorders, and what reads them.
-MAKERS = {"moticon": moticon, "pedar": pedar, "emed": emed, "tekscan": tekscan, "xdf": xdf, "lerobot": lerobot}
+MAKERS = {
+    "moticon": moticon,
+    "pedar": pedar,
+    "emed": emed,
+    "tekscan": tekscan,
+    "xdf": xdf,
+    "neutouch": neutouch,
+    "lerobot": lerobot,
+}
 #: Kinds of files of other programs, which a layout may describe.
 FOREIGN = ("table", "arrays")
 #: The endings of those that may be tables of labels.
