@@ -218,3 +218,20 @@ def test_an_array_of_records_is_a_table_of_its_fields(tmp_path: Path, ending: st
     found = taxel.open(path).frames()
     np.testing.assert_array_equal(found.values, records["palm"]["N"])
     assert found.t.tolist() == [10_000 * k for k in range(30)]
+
+
+@pytest.mark.parametrize("has_numbers", [False, True])
+def test_objects_of_matlab_are_no_arrays(has_numbers: bool, tmp_path: Path) -> None:
+    """As version 7.3 has a table: a pointer, and what it points to."""
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        file["T"] = np.arange(6, dtype=np.uint32)[None]
+        file["T"].attrs["MATLAB_object_decode"] = 3
+        file["#refs#/a"] = np.zeros((4, 90))
+        if has_numbers:
+            file["p"], file["time_s"] = np.zeros((4, 90)), np.arange(90)[None] / 50
+    if has_numbers:
+        assert values(opened(tmp_path / "a.mat")).shape == (90, 1, 4)
+        return
+    with refused(FormatError, place=Place("a.mat")) as caught:
+        opened(tmp_path / "a.mat")
+    assert "writetable" in str(caught.value)

@@ -474,6 +474,18 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
         draft.ask(f"may be no taxels: {what}", "leave_out keep", choices, *asked)
 
 
+def say_contradictions(draft: Draft, text: Text) -> None:
+    """Say which columns that hold labels or a key by the first lines have many other values later."""
+    few = [k for k, role in enumerate(draft.roles) if role.role in ("label", "sensor") and role.certainty == LIKELY]
+    fit = draft.fit.over(text.spread) if few else draft.fit
+    for k in few:
+        later = {cells[k] for cells in fit.spread} - {*fit.cells(k)} - {*MISSING}
+        if len(later) > _KEYS:
+            draft.said.append(
+                f"{draft.called(k)} has {len(later)} other values in later lines, as {named(sorted(later)[:2])}"
+            )
+
+
 def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
     """Leave out a column that ascends evenly beside the time; where the time repeats, ask which it is."""
     draft.be("counter" if draft.fit.counts(other) else "no taxel", "ascends evenly, as a time does", other)
