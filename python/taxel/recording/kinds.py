@@ -20,7 +20,7 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import emed, event_camera, lerobot, moticon, neutouch, pedar, tekscan, xdf
+from taxel.formats import emed, event_camera, insoles, lerobot, neutouch, tekscan, xdf
 from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
@@ -41,16 +41,6 @@ from taxel.recording.readers.mcap import read_mcap
 
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
 GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
-#: Files of makers and of recorders, and what reads them.
-MAKERS = {
-    "moticon": moticon,
-    "pedar": pedar,
-    "emed": emed,
-    "tekscan": tekscan,
-    "xdf": xdf,
-    "neutouch": neutouch,
-    "lerobot": lerobot,
-}
 #: Kinds of files of other programs, which a layout may describe.
 FOREIGN = ("table", "arrays")
 #: The endings of those that may be tables of labels.
@@ -112,6 +102,15 @@ class Kind:
     read: Callable[[Path, Layout | None], Sequence[Reader]]
 
 
+_MODULES = {"emed": emed, "tekscan": tekscan, "xdf": xdf, "neutouch": neutouch, "lerobot": lerobot}
+#: Files of makers and of recorders.
+MAKERS = {
+    "moticon": Kind(insoles.is_moticon, insoles.read_moticon),
+    "pedar": Kind(insoles.is_pedar, insoles.read_pedar),
+    **{name: Kind(module.knows, module.read) for name, module in _MODULES.items()},
+}
+
+
 def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     """Yield the kinds of files with their names, in the order in which they are tried.
 
@@ -158,7 +157,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     }.items()
     yield from _from_elsewhere().items()
     yield from {
-        **{name: Kind(maker.knows, maker.read) for name, maker in MAKERS.items()},
+        **MAKERS,
         "lerobot": Kind(lerobot.knows, lambda path, layout: lerobot.read(path, layout, how.label_column)),
         "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
