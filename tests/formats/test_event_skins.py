@@ -31,6 +31,19 @@ def test_events_of_two_fingers_open_by_themselves(more: str, tmp_path: Path) -> 
     assert np.abs(events.t - T_US).max() <= 1
 
 
+def test_lines_that_a_host_swapped_are_sorted_and_those_of_another_run_refused(tmp_path: Path) -> None:
+    t = T_US.copy()
+    t[[100, 300]] = t[[101, 301]]
+    t[[101, 301]] -= 20
+    with pytest.warns(UserWarning, match="2 lines out of order, sorted by time"):
+        events = taxel.open(written(tmp_path / "grasp.tact", t)).events
+    assert (np.diff(events.t) >= 0).all()
+    assert np.bincount(events.x, minlength=80).tolist() == np.bincount(TAXELS, minlength=80).tolist()
+    again = np.concatenate([T_US[300:], T_US[:300]])
+    with pytest.raises(taxel.FormatError, match="before that of the line above"):
+        taxel.open(written(tmp_path / "again.tact", again))
+
+
 def test_places_of_taxels_come_from_a_layout(tmp_path: Path) -> None:
     path = written(tmp_path / "grasp.tact")
     (tmp_path / "grasp.layout.toml").write_text("rows = 8\ncolumns = 10\npitch_mm = 2\n")

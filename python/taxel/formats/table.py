@@ -40,6 +40,8 @@ ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
 _CELLS = 1 << 21
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
+#: Lines of events are swapped by at most so much, us.
+_SWAPPED_US = 1_000_000
 #: The least and the largest value of the columns of events.
 _EVENTS = {"x": (0, 65_534), "y": (0, 65_534), "p": (-1, 1), "intensity": (0, 65_535), "repaired": (0, 1)}
 
@@ -134,7 +136,7 @@ def _read_part(
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said(), *more]
     said, notes = [*form.said, *rows.odd.said(), *more], dict[str, list[Note]]()
     if how.events:
-        sources = {part: _events(path, full, form, rows, array)}
+        sources = {part: _events(path, full, form, rows, array, said)}
         shape = sources[part].array.shape
         if array is None and layout.rows is None:
             said.append(f"{shape[0]} x {shape[1]} taxels assumed, which the table does not state")
@@ -434,8 +436,8 @@ def _labels(form: Form, beside: Any, t: NDArray[np.int64]) -> list[Note]:
     return [Note(f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes]
 
 
-def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | None) -> Events:
-    """Return the events of a table with a line each."""
+def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | None, said: list[str]) -> Events:
+    """Return the events of a table with a line each; the lines of two sensors that a host asks may be swapped."""
     names = [form.names[k].lower() for k in form.taxels]
     names = [EVENT_COLUMNS.get(name, name) for name in names]
     right = ({"x", "y"}, {"taxel"}), ({"p"}, {"is_negative"})
@@ -443,14 +445,19 @@ def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | N
         wrong = f"the columns other than the time are {', '.join(names)}"
         raise unreadable(f"{wrong}; must be x, y, p, or taxel, p, for events", path)
     try:
-        return events_of(path, form, names, rows, array if layout.rows is None else layout.array(1))
+        events = events_of(path, form, names, rows, array if layout.rows is None else layout.array(1))
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
+    late = np.maximum.accumulate(events.t) - events.t
+    back = np.flatnonzero(late)
+    if len(back) > ODD * len(late) or late.max(initial=0) > _SWAPPED_US:
+        line = rows.line(int(back[0]), path, form.first)
+        raise unreadable("the time is before that of the line above", path, line=line)
+    said += [f"{counted(len(back), 'line')} out of order, sorted by time"] * bool(len(back))
+    return events[np.argsort(events.t, kind="stable")] if len(back) else events
 
 
-def events_of(
-    path: Path, form: Form, names: Sequence[str], rows: Rows, array: Array | None, *, ascending: bool = True
-) -> Events:
+def events_of(path: Path, form: Form, names: Sequence[str], rows: Rows, array: Array | None) -> Events:
     """Return the events of a table with a line each; several may have the same time.
 
     Parameters
@@ -462,8 +469,6 @@ def events_of(
     rows : Rows
     array : Array, optional
         Default: one large enough.
-    ascending : bool
-        Whether a time that is before that of the line above is refused.
 
     Raises
     ------
@@ -486,10 +491,9 @@ def events_of(
             line = rows.line(int(wrong[0]), path, form.first)
             raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", path, line=line)
     us = us_of(rows.times, form.unit_of_times)
-    back = np.flatnonzero(~(np.diff(us, prepend=us[:1]) >= 0) if ascending else np.isnan(us))
-    if len(back):
-        line = rows.line(int(back[0]), path, form.first)
-        raise unreadable("the time is before that of the line above, or is none", path, line=line)
+    none = np.flatnonzero(np.isnan(us))
+    if len(none):
+        raise unreadable("the time is none", path, line=rows.line(int(none[0]), path, form.first))
     x, y = by_name["x"].astype(np.uint16), by_name["y"].astype(np.uint16)
     more: dict[str, Any] = {"repaired": by_name["repaired"] > 0} if "repaired" in by_name else {}
     if present is not None:
