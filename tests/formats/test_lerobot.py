@@ -99,6 +99,28 @@ def test_axes_and_features_of_other_names_are_asked(tmp_path: Path) -> None:
     assert only.array.names == ("a", "b")
 
 
+@pytest.mark.parametrize("shape", [(), (5,), (2, 4), (2, 3, 4), (6, 3), (3, 5, 3)])
+def test_a_shape_says_sensors_rows_columns_and_axes(shape: tuple[int, ...], tmp_path: Path) -> None:
+    values = np.random.default_rng(1).random((90, *shape)).astype(np.float32)
+    feature = {"dtype": "float32", "shape": list(shape) or [1], "names": None}
+    path = of_version_2(tmp_path / "a", {"skin.pressure": feature}, **{"skin.pressure": values.tolist()})
+    (tmp_path / "a.layout.toml").write_text('axis = "y"\n[data]\narray = "skin.pressure"\n')
+    found = [each.frames().values for each in taxel.open_all(path)[0].sources.values()]
+    whole = values[..., 1] if shape[-1:] == (3,) else values
+    parts = [whole] if whole.ndim < 4 else list(whole.swapaxes(0, 1))
+    assert len(found) == len(parts)
+    for mine, part in zip(found, parts, strict=True):
+        np.testing.assert_array_equal(mine, part.reshape(90, *[1] * (3 - part.ndim), *part.shape[1:]))
+
+
+@pytest.mark.parametrize("cell", [[1.0], [1.0, 2.0, 3.0], None])
+def test_cells_of_another_shape_than_is_stated_are_refused(cell: list[float] | None, tmp_path: Path) -> None:
+    feature = {"dtype": "float32", "shape": [2], "names": None}
+    path = of_version_2(tmp_path / "a", {"touch": feature}, touch=[*[[1.0, 2.0]] * 50, cell, *[[1.0, 2.0]] * 50])
+    with pytest.raises(FormatError, match="touch of episode_000000 is not of shape"):
+        taxel.open_all(path)
+
+
 def test_a_data_set_that_is_none_is_refused(tmp_path: Path) -> None:
     path = of_version_2(tmp_path / "a")
     with refused(ProblemError, "label_column"):

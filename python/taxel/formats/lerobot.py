@@ -104,9 +104,16 @@ def read(path: Path, layout: Layout | None = None, label_column: str | int | Non
         cells = [] if label is None else rows["task_index"].map(tasks) if label == TASK else rows[label]
         sources: dict[str, Frames] = {}
         for feature in chosen:
-            values, names = _values(rows[feature], numbers[feature])
+            try:
+                sensors, names = _values(rows[feature], numbers[feature])
+            except (ValueError, TypeError) as error:
+                stated = f"shape {numbers[feature]['shape']} in meta/info.json"
+                raise unreadable(f"{feature} of {name} is not of {stated}: {first_line(error)}", path) from None
             called = source_of(feature.removeprefix("observation."))
-            sources.update(sources_of(path, full, called, values, t, names))
+            for k, values in enumerate(sensors):
+                sources.update(
+                    sources_of(path, full, f"{called}_{k}" if len(sensors) > 1 else called, values, t, names)
+                )
         notes = dict.fromkeys(sources, _notes(str(label), list(cells), t))
         for each in readers_of(path, "lerobot", sources, full, (), timed=True, lost=lost, notes=notes, roles=roles):
             readers.append(replace(each, facts=replace(each.facts, name=name)))
@@ -208,15 +215,25 @@ def _axes(feature: Mapping[str, Any]) -> list[list[int]] | None:
 
 
 def _values(cells: Any, feature: Mapping[str, Any]) -> tuple[NDArray[np.float32], list[str] | None]:
-    """Return values of shape (frames, rows, columns), or with axes behind, and the names of taxels of a row."""
+    """Return values of shape (sensors, frames, rows, columns), or with axes behind, and the names of taxels of a row.
+
+    Three dimensions without axes are several sensors of rows and columns.
+
+    Raises
+    ------
+    ValueError, TypeError : cells of another shape than the feature's
+    """
     shape, names, axes = feature["shape"], _names(feature), _axes(feature)
-    values = np.stack([values_in(cell) for cell in cells]).astype(np.float32).reshape(len(cells), -1)
-    if axes is None:
-        rows, columns = shape if len(shape) == 2 else (1, values.shape[1])
-        return values.reshape(-1, rows, columns), names if len(shape) == 1 and names else None
-    if len(shape) == 1:
-        return values[:, None][..., axes], [name.rstrip("xyzXYZ_. ") for name in names[:: len(AXES)]]
-    return values.reshape(len(cells), *(shape if len(shape) == 3 else (1, *shape))), None
+    values = np.stack([values_in(cell) for cell in cells]).astype(np.float32)
+    if values.ndim > len(shape) and list(values.shape[1:]) != shape:
+        raise ValueError(f"shape {list(values.shape[1:])}")
+    values = values.reshape(len(cells), *shape)
+    if axes is not None:
+        values = values.reshape(len(cells), *shape[:-2], -1)[..., axes]
+        stems = [name.rstrip("xyzXYZ_. ") for name in names[:: len(AXES)]] if len(shape) == 1 else None
+        return values.reshape(1, len(cells), -1, *values.shape[-2:]), stems
+    sensors = values.reshape(len(cells), *[1] * (3 - len(shape)), *shape).swapaxes(0, 1)
+    return sensors, names if len(shape) == 1 and names else None
 
 
 def _notes(name: str, cells: Sequence[Any], t: NDArray[np.int64]) -> list[Note]:
