@@ -8,6 +8,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,8 @@ _WHEN = re.compile(
 _SIX_DIGITS = re.compile(r"\d{6}(?:[.,+Z-].*)?", re.ASCII)
 _TWO_NUMBERS = re.compile(r"\d{1,2}:\d\d", re.ASCII)
 _DAY_US = 86_400_000_000
+#: Characters of a date: 1.5.2024. Most cells are shorter, and to look takes long.
+_SHORTEST_DATE = 8
 #: A counter of times that is full begins at 0 again: its values, in the unit of the file.
 _WRAPS = (1 << 16, 1 << 32)
 #: A step over a wrap, or to a line out of order, is at most so many usual ones.
@@ -77,7 +80,7 @@ def is_of_two_numbers(cell: str) -> bool:
 
 def is_day(cell: str) -> bool:
     """Return whether a text is a date without a time."""
-    return ":" not in cell and bool(cell) and _WHEN.fullmatch(cell) is not None
+    return len(cell) >= _SHORTEST_DATE and ":" not in cell and _WHEN.fullmatch(cell) is not None
 
 
 def seconds_of(cell: str) -> float:
@@ -104,13 +107,7 @@ def seconds_of(cell: str) -> float:
             at = datetime.fromisoformat(f"1970-01-01T{cell}" if _SIX_DIGITS.fullmatch(cell) else cell)
             return at.replace(tzinfo=at.tzinfo or UTC).timestamp()
         day, by_month, *clock, fraction, half, zone = found.groups()
-        midnight = 0.0
-        if day or by_month:
-            first, second, third = re.split("[-/.]", (day or by_month).lower())
-            year, month, date = (first, second, third) if len(first) > len(third) else (third, second, first)
-            month, date = (date, month) if by_month else (month, date)
-            of_year = _MONTHS.index(month) + 1 if month in _MONTHS else int(month)
-            midnight = datetime(int(year), of_year, int(date), tzinfo=UTC).timestamp()
+        midnight = _midnight((day or by_month).lower(), by_month is not None) if day or by_month else 0.0
     except ValueError:
         return math.nan
     # Two numbers before a fraction are minutes and seconds.
@@ -122,6 +119,16 @@ def seconds_of(cell: str) -> float:
         return math.nan
     ahead = int(f"{zone[0]}1") * (3600 * int(zone[1:3]) + 60 * int(zone[-2:])) if zone and zone not in "Zz" else 0
     return midnight + 3600 * hour + 60 * minute + second + (float(f".{fraction:.6}") if fraction else 0.0) - ahead
+
+
+@lru_cache(1000)
+def _midnight(date: str, by_month: bool) -> float:
+    """Return the seconds since 1970 at the begin of a day, of few in a file."""
+    first, second, third = re.split("[-/.]", date)
+    year, month, day = (first, second, third) if len(first) > len(third) else (third, second, first)
+    month, day = (day, month) if by_month else (month, day)
+    of_year = _MONTHS.index(month) + 1 if month in _MONTHS else int(month)
+    return datetime(int(year), of_year, int(day), tzinfo=UTC).timestamp()
 
 
 def epoch_of(numbers: NDArray[np.float64]) -> str:
