@@ -126,7 +126,8 @@ def test_numbered_groups_are_trials(above: str, tmp_path: Path) -> None:
         for k, frames in of_each.items():
             file[f"{above}{k}/obs/tactile"], file[f"{above}{k}/obs/time_s"] = frames, np.arange(len(frames)) / 50
         file[f"{above}0/remark"] = np.zeros(3)
-    found = taxel.open_all(tmp_path / "a.h5")
+    with pytest.warns(UserWarning, match="its groups are trials: "):
+        found = taxel.open_all(tmp_path / "a.h5")
     assert [each.name for each in found] == [f"{above.rpartition('/')[2]}{k}" for k in of_each]
     for recording, frames in zip(found, of_each.values(), strict=True):
         np.testing.assert_array_equal(recording.frames().values, frames)
@@ -218,6 +219,13 @@ def test_an_array_of_records_is_a_table_of_its_fields(tmp_path: Path, ending: st
     found = taxel.open(path).frames()
     np.testing.assert_array_equal(found.values, records["palm"]["N"])
     assert found.t.tolist() == [10_000 * k for k in range(30)]
+
+
+def test_numbered_parts_of_a_body_are_no_trials(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.update({f"finger{k}/p": np.zeros((30, 4)) for k in range(3)} | {"time_s": np.arange(30) / 50})
+    with pytest.raises(FormatError, match="name the array of frames"):
+        taxel.open_all(tmp_path / "a.h5")
 
 
 @pytest.mark.parametrize("has_numbers", [False, True])

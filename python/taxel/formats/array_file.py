@@ -14,17 +14,19 @@ from numpy.typing import DTypeLike, NDArray
 
 from taxel._base.arrays import read_arrays, shapes
 from taxel._base.errors import unreadable
-from taxel._base.messages import counted
+from taxel._base.messages import counted, warn
 from taxel.formats.column_names import AXES, time_unit
 from taxel.formats.layout import Data, Layout, advice
 from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
-from taxel.formats.roles import LIKELY, OPEN, SURE, Changes, Question, Role
+from taxel.formats.roles import LIKELY, OPEN, SURE, Changes, Question, Role, named
 from taxel.formats.times import in_order, unit_of_times
 from taxel.reading import InMemory
 
 #: The path of a numbered group within others: data/demo_0/ of data/demo_0/obs/tactile.
 _NUMBERED = re.compile(r"(?:[^/]*[^/\d]/)*[^/]*\d+/")
+#: Numbered groups of these names are parts of a body, at one time.
+_PARTS = re.compile(r"sensor|taxel|finger|hand|foot|skin|patch|pad|device|board|channel|node|module", re.IGNORECASE)
 
 
 def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
@@ -37,6 +39,8 @@ def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
     FormatError : no such array, several that may hold the frames, or axes that can be read in two ways (prints both)
     """
     groups = _groups(shapes(path), layout)
+    if len(groups) > 1:
+        warn(f"{path.name}: its groups are trials: {named([*groups])}", stacklevel=6)
     return [each for name, group in groups.items() for each in _read_group(path, layout, group, name)]
 
 
@@ -103,7 +107,7 @@ def _groups(stored: Mapping[str, tuple[int, ...]], layout: Layout) -> dict[str, 
     stems = {re.sub(r"\d+/$", "", group) for group in found}
     common = set[str]().union(*found.values()).intersection(*found.values())
     is_stated = layout.data is not None and layout.data.array is not None and layout.data.array.strip("/") in stored
-    if len(found) < 2 or len(stems) > 1 or not common or is_stated:
+    if len(found) < 2 or len(stems) > 1 or not common or is_stated or any(map(_PARTS.search, stems)):
         return {"": Group(stored)}
     order = sorted(found, key=lambda group: int(re.findall(r"\d+", group)[-1]))
     return {
