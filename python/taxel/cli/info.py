@@ -242,7 +242,6 @@ def _lines(pressed: Series) -> Iterator[str]:
 
 def _page(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording as lines for people."""
-    from taxel.formats.layout import layout_name  # noqa: PLC0415
     from taxel.formats.roles import SURE, Role, lines_of  # noqa: PLC0415
     from taxel.recording import kind_of_file  # noqa: PLC0415
 
@@ -257,7 +256,7 @@ def _page(facts: dict[str, Any]) -> list[str]:
         lines += ["roles of its columns; ~ is assumed:", *lines_of([Role(**role) for role in facts["roles"]])]
     if facts["layout"]:
         lines += [
-            f"read by this layout, which {layout_name(Path(facts['file']))} may state:",
+            f"read by this layout, which {facts['layout_file']} may state:",
             *facts["layout"].splitlines(),
         ]
     return [*lines, *([f"table written to {facts['table']}"] if "table" in facts else [])]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from taxel.clock import doubt
 from taxel.events import Events
+from taxel.formats.layout import layout_name
 from taxel.frames import Frames
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series
@@ -105,6 +106,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
         "layout": stated,
+        "layout_file": layout_name(recording.path),
         "roles": list(recording._main.facts.roles),
     }
 
