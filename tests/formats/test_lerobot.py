@@ -81,6 +81,9 @@ def test_detections_join_with_the_frames_of_the_data_set(tmp_path: Path, capsys)
         code, _, error = call(capsys, "detect", path, "--readout", rule, "-o", path / folder / "found.csv")
         assert (code, "among the tables of a data set" in error) == (2, True)
     assert sorted(path.rglob("*")) == before
+    taxel.convert(taxel.Frames(np.zeros((9, 1, 1)), 1000 * np.arange(9)), tmp_path / "a.npz")
+    code, _, error = call(capsys, "detect", path, tmp_path / "a.npz", "--readout", rule, "-o", tmp_path / "b.parquet")
+    assert (code, "write a .csv" in error) == (2, True)
 
 
 def test_axes_and_features_of_other_names_are_asked(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from taxel.cli._say import say
 from taxel.cli._task import OutOption, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import App, Flat
 from taxel.detections import Detections
-from taxel.formats.lerobot import check_outside
+from taxel.formats.lerobot import check_target
 from taxel.options import DetectOptions, Reading
 from taxel.spikes import to_ms
 
@@ -73,7 +73,7 @@ def detect(
     """
     output.check(out)
     output.check_report(report)
-    check_outside(out)
+    check_target(out, recordings)
     given = one_or_several(truth) if truth else None
     loaded = taxel.detect.load(readout)
     with progress(output.json) as update:

@@ -54,16 +54,19 @@ def episode_of(name: str) -> int:
     return int(name.rpartition("_")[2])
 
 
-def check_outside(file: Path | None) -> None:
-    """Refuse to write a file among the tables of a data set.
+def check_target(file: Path | None, recordings: Sequence[Path]) -> None:
+    """Refuse to write a table of detections among those of a data set, or as Parquet if it is of anything else.
 
     Raises
     ------
-    ProblemError : it is below ``data`` or ``meta``
+    ProblemError : it is so
     """
-    for folder in () if file is None else file.absolute().parents:
-        if folder.name in ("data", "meta", "videos") and knows(folder.parent):
-            raise ProblemError(f"{file}: is among the tables of a data set; write it elsewhere")
+    if file is None:
+        return
+    if file.suffix.lower() == ".parquet" and not all(map(knows, recordings)):
+        raise ProblemError(f"{file}: is only for detections in a data set of LeRobot; write a .csv")
+    if any(folder.name in ("data", "meta", "videos") and knows(folder.parent) for folder in file.absolute().parents):
+        raise ProblemError(f"{file}: is among the tables of a data set; write it elsewhere")
 
 
 def read(path: Path, layout: Layout | None = None, label_column: str | int | None = None) -> list[InMemory]:
