@@ -307,7 +307,7 @@ def _line_by_line(text: Text, form: Form) -> Rows:
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
         if number <= form.first and not is_begin:
             continue
-        if is_begin or how.is_between(line) or not line.strip(f"\t ;,{how.separator}"):
+        if is_begin or not line.strip(f"\t ;,{how.separator}"):
             waiting = True
             if is_begin and how.frame_time is not None:
                 found = _NUMBER.findall(line)

@@ -20,7 +20,7 @@ from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
 from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named
-from taxel.formats.times import ISO, is_of_two_numbers, unit_of_times
+from taxel.formats.times import ISO, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, that one counts lines, and what values stay.
 _ASCENDS, _COUNTS, _STAYS = 8, 20, 40
@@ -32,6 +32,8 @@ _BLOCKS = 64
 _SERIES = 4
 #: A number with other text behind it, which is no date, time or address.
 _GLUED = re.compile(r"[-+]?\d+(?:[.,]\d+)?[ \t]*[^\s\d:/.,-]")
+#: Hours and minutes, or as well minutes and seconds.
+_TWO_NUMBERS = re.compile(r"\d{1,2}:\d\d", re.ASCII)
 #: Names of the columns of events: a place, or the number of a taxel, and whether it rises, or falls.
 EVENT_COLUMNS = {"col": "x", "column": "x", "row": "y", "pol": "p", "polarity": "p", "on": "p"}
 EVENT_COLUMNS |= dict.fromkeys(("address", "addr", "taxel_id"), "taxel")
@@ -137,7 +139,7 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     if not draft.is_stated("time_unit"):
         is_text = fit.types[column] == "time"
         draft.set(time_unit=ISO if is_text else "s" if len(places) > 1 else _unit_of_time(draft, column))
-        if is_text and all(map(is_of_two_numbers, fit.cells(column))):
+        if is_text and all(map(_TWO_NUMBERS.fullmatch, fit.cells(column))):
             example = fit.cells(column)[-1]
             why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
             draft.ask(why, "time_unit", {"hours and minutes": {"time_unit": ISO}}, column)

@@ -48,7 +48,6 @@ _WHEN = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 _SIX_DIGITS = re.compile(r"\d{6}(?:[.,+Z-].*)?", re.ASCII)
-_TWO_NUMBERS = re.compile(r"\d{1,2}:\d\d", re.ASCII)
 _DAY_US = 86_400_000_000
 #: Characters of a date: 1.5.2024. Most cells are shorter, and to look takes long.
 _SHORTEST_DATE = 8
@@ -71,11 +70,6 @@ def is_time(cell: str) -> bool:
     (True, True, True, False)
     """
     return ":" in cell and _WHEN.fullmatch(cell) is not None
-
-
-def is_of_two_numbers(cell: str) -> bool:
-    """Return whether a time is of hours and minutes, or as well of minutes and seconds."""
-    return _TWO_NUMBERS.fullmatch(cell) is not None
 
 
 def is_day(cell: str) -> bool:
