@@ -51,6 +51,7 @@ ENDINGS: dict[str, str] = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv"
 _LEAST = 2
 #: Kinds of files that are no recordings of one format.
 _OTHERS = {"arrays": "file of arrays", "records": "file of events", "table": "table", "ros": "ROS bag"}
+_OTHERS |= {"lerobot": "LeRobot data set", "neutouch": "NeuTouch recording"}
 
 
 def after_zeros(frames: Frames, seconds: float) -> Frames:

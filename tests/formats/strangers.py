@@ -77,6 +77,15 @@ TEXTS: dict[str, str] = {
     "18 cells of spreadsheets": lines(lambda k: f"{k * 10},{'#N/A' if k % 5 == 3 else k},{k % 7}", 60, "t_ms,a,b"),
     "18 one odd cell": lines(lambda k: f"{k * 10},{'OVF' if k == 7 else k % 9},{k % 7}", 60, "t_ms,a,b"),
     "events without a size": lines(lambda k: f"{k % 9},{k % 5},{k % 2},{k * 10}", 60, "x,y,p,t_us"),
+    # Each is read by a rule of its own.
+    "units behind decimal commas": lines(lambda k: f"{k * 20} ms; {k % 9},5N; {k % 7},25N"),
+    "thousands in quotes": lines(lambda k: f'{k * 20},"1,{200 + 37 * k % 90}.5","2,{300 - k % 7}.5"', 60, "t_ms,a,b"),
+    "a hand that stays": lines(lambda k: f"{k * 20},left,{rows(k, 2)}", 60, "t_ms,hand,a,b"),
+    "columns by number": "1,2,3,4\n" + lines(lambda k: rows(k, 4)),
+    "one taxel that is named as a label": lines(lambda k: f"{k * 20},{k % 2}", 60, "t_ms,contact"),
+    "dates between marks": lines(lambda k: f"2024-05-01 10:00:{k:02}.5 -> {rows(k, 2)}"),
+    "thousands or decimals, and times": lines(lambda k: f"{k * 20};1.{200 + k}", 60, "time;a"),
+    "events without names": lines(lambda k: f"{k * 9},{k % 9},{k % 5},{k % 2}"),
     "a document of JSON": '{\n "p": [1, 2]\n}\n',
 }
 

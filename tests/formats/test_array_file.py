@@ -107,14 +107,31 @@ def test_a_layout_of_the_unit_alone_leaves_the_times(tmp_path: Path) -> None:
     assert (found.layout.unit, found.layout.data.time, found.layout.data.time_unit) == ("kPa", "time", "s")
 
 
-def test_each_trial_is_a_source_and_each_axis_too(tmp_path: Path) -> None:
+def test_each_trial_is_a_recording_and_each_axis_a_source(tmp_path: Path) -> None:
     numbers = np.arange(2 * 5 * 4 * 3, dtype=np.float32).reshape(2, 5, 4, 3)
     np.save(tmp_path / "a.npy", numbers)
-    found = opened(tmp_path / "a.npy", 'axis = "z"\n[data]\naxes = "trial time taxel axis"\n')
-    assert list(found.sources) == ["trial1", "trial2"]
-    np.testing.assert_array_equal(values(found, "trial2")[:, 0], numbers[1, :, :, 2])
-    found = opened(tmp_path / "a.npy", 'axis = "all"\n[data]\naxes = "trial time taxel axis"\n')
-    assert list(found.sources) == [f"trial{k}_{axis}" for k in (1, 2) for axis in "xyz"]
+    layout = tmp_path / "a.layout.toml"
+    layout.write_text('axis = "all"\n[data]\naxes = "trial time taxel axis"\n')
+    for k, recording in enumerate(taxel.open_all(tmp_path / "a.npy")):
+        assert (recording.name, list(recording.sources)) == (f"trial{k + 1}", ["x", "y", "z"])
+        np.testing.assert_array_equal(recording.sources["z"].frames().values[:, 0], numbers[k, :, :, 2])
+
+
+@pytest.mark.parametrize("above", ["data/demo_", "episode", "runs/a/"])
+def test_numbered_groups_are_trials(above: str, tmp_path: Path) -> None:
+    """As robots' episodes are kept; also where one of them has more arrays, or more frames."""
+    random = np.random.default_rng(1)
+    of_each = {k: random.random((30 + k, 2, 3)).astype(np.float32) for k in (0, 2, 10)}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k, frames in of_each.items():
+            file[f"{above}{k}/obs/tactile"], file[f"{above}{k}/obs/time_s"] = frames, np.arange(len(frames)) / 50
+        file[f"{above}0/remark"] = np.zeros(3)
+    with pytest.warns(UserWarning, match="its groups are trials: "):
+        found = taxel.open_all(tmp_path / "a.h5")
+    assert [each.name for each in found] == [f"{above.rpartition('/')[2]}{k}" for k in of_each]
+    for recording, frames in zip(found, of_each.values(), strict=True):
+        np.testing.assert_array_equal(recording.frames().values, frames)
+        assert np.diff(recording.frames().t).tolist() == [20_000] * (len(frames) - 1)
 
 
 def test_three_axes_at_the_end_are_asked(tmp_path: Path) -> None:
@@ -202,3 +219,27 @@ def test_an_array_of_records_is_a_table_of_its_fields(tmp_path: Path, ending: st
     found = taxel.open(path).frames()
     np.testing.assert_array_equal(found.values, records["palm"]["N"])
     assert found.t.tolist() == [10_000 * k for k in range(30)]
+
+
+def test_numbered_parts_of_a_body_are_no_trials(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.update({f"finger{k}/p": np.zeros((30, 4)) for k in range(3)} | {"time_s": np.arange(30) / 50})
+    with pytest.raises(FormatError, match="name the array of frames"):
+        taxel.open_all(tmp_path / "a.h5")
+
+
+@pytest.mark.parametrize("has_numbers", [False, True])
+def test_objects_of_matlab_are_no_arrays(has_numbers: bool, tmp_path: Path) -> None:
+    """As version 7.3 has a table: a pointer, and what it points to."""
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        file["T"] = np.arange(6, dtype=np.uint32)[None]
+        file["T"].attrs["MATLAB_object_decode"] = 3
+        file["#refs#/a"] = np.zeros((4, 90))
+        if has_numbers:
+            file["p"], file["time_s"] = np.zeros((4, 90)), np.arange(90)[None] / 50
+    if has_numbers:
+        assert values(opened(tmp_path / "a.mat")).shape == (90, 1, 4)
+        return
+    with refused(FormatError, place=Place("a.mat")) as caught:
+        opened(tmp_path / "a.mat")
+    assert "writetable" in str(caught.value)

@@ -145,10 +145,8 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
         np.testing.assert_array_equal(recording.frames().values, VALUES.reshape(3, 2, 3).astype(np.float32) + 1)
         assert recording.frames().t.tolist() == [0, 250_000, 750_000]
         assert recording.lost == ("other arrays of the file: run1/pressure, run1/when",)
-    layout.write_text('[data]\narray = "pressure"\n')
-    with pytest.raises(
-        FormatError, match=r"no array pressure, .*; its arrays are run1/pressure \(3 x 2 x 3\), run2/pressure"
-    ):
+    layout.write_text('[data]\narray = "forces"\n')
+    with pytest.raises(FormatError, match=r"no array forces, .*; its arrays are pressure \(3 x 2 x 3\), when"):
         taxel.open(tmp_path / "a.h5")
 
 

@@ -82,6 +82,8 @@ def test_the_unit_of_stamps_is_that_in_which_lines_arrive() -> None:
     [
         (["10,7,7", "20,7,7", "30,7,7"], {}),
         (repeated(lambda k: f"{k},{['left', 'right'][k % 2]},7,7"), {}),
+        (["left: 1,2", "right: 3,4"] * 9, {}),
+        (['{"t": 0, "left": [1, 2]}', '{"t": 5, "right": [3, 4]}'] * 9, {}),
         (["1,2"] * 5, {"columns": ["a", "b", "c"]}),
         (["1,2"] * 5, {"time": "3:ms"}),
         (["1,2"] * 5, {"time": "1:q"}),

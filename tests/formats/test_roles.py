@@ -101,6 +101,18 @@ def test_lines_over_the_whole_file_say_what_a_column_is(tmp_path: Path) -> None:
     assert len(layouts(tmp_path, text)) == 3
 
 
+def test_later_lines_that_contradict_the_first_are_said(tmp_path: Path) -> None:
+    """A column that is named as labels, and is a sensor that is touched later."""
+
+    def text(count: int) -> str:
+        return lines(
+            lambda k: f"{10 * k},{k % 9},{k % 7},{k % 311 if k >= count else k // 50 % 2}", 9000, "t_ms,a,b,contact"
+        )
+
+    assert " other values in later lines, as 1" in opened(tmp_path, text(5000)).said
+    assert "later lines" not in opened(tmp_path, text(9000)).said
+
+
 def test_info_shows_roles_that_are_likely_and_refuses_open_ones(tmp_path: Path, capsys) -> None:
     code, shown, _ = call(capsys, "info", written("9 a mean", tmp_path))
     assert code == 0

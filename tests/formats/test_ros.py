@@ -372,6 +372,8 @@ def test_named_channels_are_taken_by_name_and_a_field_splits(tmp_path: Path, mon
     (tmp_path / "a.layout.toml").write_text('[ros]\ntopic = "/touch"\nby = "hand"\n')
     split = taxel.open(bag)
     assert list(split.sources) == ["touch_left", "touch_right"]
+    roles = {role["name"]: role["role"] for role in split.sources["touch_left"]._main.facts.roles}
+    assert roles == {"time of the bag": "time", "hand": "sensor", "taxels": "taxel"}
     assert split.sources["touch_left"].frames().values[:, 0].tolist() == [[5, 6], [9, 9]]
 
 

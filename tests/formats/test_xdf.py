@@ -70,6 +70,11 @@ def test_streams_of_numbers_are_sources_and_texts_are_labels(tmp_path: Path) -> 
     np.testing.assert_array_equal(frames.values[:, 0], left)
     np.testing.assert_allclose(np.diff(frames.t), 10_000, atol=1)
     assert (frames.unit, frames.array.names) == ("N", ("a", "b"))
+    roles = recording.sources["left_hand"]._main.facts.roles
+    assert [(each["name"], each["role"], each["unit"]) for each in roles[1:]] == [
+        ("a", "taxel", "N"),
+        ("b", "taxel", "N"),
+    ]
     assert [(note.text, note.t) for note in recording.sources["right"].notes] == [("touch", 1_055_000)]
     (tmp_path / "a.layout.toml").write_text('[data]\narray = "right"\n')
     assert taxel.open(path).frames().values.shape == (20, 1, 3)

@@ -15,9 +15,11 @@ from shell import call
 import taxel
 from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
+from taxel.detect.examples import frame_ms
 from taxel.detect.folds import split
 from taxel.encode import LevelCrossing
 from taxel.reading import Facts, InMemory, Marks
+from taxel.recording.frames import value_us
 from taxel.tasks.labels import references
 
 from .making import images
@@ -211,3 +213,19 @@ def test_the_feet_of_one_recording_share_a_fold() -> None:
         assert len(fold.test) == 2
         assert fold.test[0][1:] == fold.test[1][1:]
         assert {one.example for one in fold.train} == {0, 1}
+
+
+@pytest.mark.parametrize(("rows_hz", "values_hz"), [(39.0, 10.0), (100.0, 20.0), (100.0, 100.0)])
+def test_the_rate_of_values_that_are_held_is_that_of_the_sensor(rows_hz: float, values_hz: float) -> None:
+    t = np.rint(np.arange(600) * 1e6 / rows_hz).astype(np.int64)
+    of_sensor = np.random.default_rng(1).integers(0, 900, (700, 1, 5))
+    frames = Frames(of_sensor[np.floor(t / 1e6 * values_hz + 1e-6).astype(int)], t)
+    assert 1e6 / value_us(frames) == pytest.approx(values_hz, rel=0.05)
+    assert frame_ms(frames) == pytest.approx(1e3 / values_hz, rel=0.05)
+
+
+def test_slow_changes_and_a_sensor_at_rest_are_not_held() -> None:
+    ramp = np.floor(np.arange(600) / 7)[:, None, None]
+    for values in (ramp, np.zeros((600, 1, 1)), ramp[:1], ramp[:0]):
+        frames = Frames(values, 10_000 * np.arange(len(values)))
+        assert value_us(frames) == (10_000 if len(values) > 1 else 0)

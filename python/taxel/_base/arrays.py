@@ -258,7 +258,12 @@ def _stored(path: Path) -> Iterator[dict[str, _Stored]]:
     is_matlab = ending == ".mat"
     if head.startswith(b"\x89HDF") or head == b"MATLAB 7.3" or ending in (".h5", ".hdf5"):
         with hdf5(path) as opened:
-            yield {name: _of_dataset(data, is_matlab=is_matlab) for name, data in datasets(opened).items()}
+            # An object of MATLAB is a number that points into others, which begin with "#".
+            found = {name: data for name, data in datasets(opened).items() if not (is_matlab and name.startswith("#"))}
+            own = {name: data for name, data in found.items() if "MATLAB_object_decode" not in data.attrs}
+            if len(own) < len(found) and not own:
+                raise _of_objects(path)
+            yield {name: _of_dataset(data, is_matlab=is_matlab) for name, data in own.items()}
     elif is_matlab:
         yield _of_matlab(path)
     elif head.startswith(b"\x93NUMPY") or ending == ".npy":
@@ -313,10 +318,15 @@ def _of_matlab(path: Path) -> dict[str, _Stored]:
         try:
             found = [(name, shape) for name, shape, kind in whosmat(path) if kind in _MATLAB]
         except TypeError:
-            right = "save its columns, for a table by writetable(T, 'FILE.csv')"
-            raise unreadable(f"contains an object of MATLAB, which SciPy does not read; {right}", path) from None
+            raise _of_objects(path) from None
     # The width of numbers that are stored in fewer bytes than their class has is known when they are read.
     return {name: _Stored(shape, np.dtype(np.float64), partial(read, name)) for name, shape in found}
+
+
+def _of_objects(path: Path) -> Error:
+    """Return the error of a file of objects of MATLAB, as its tables are."""
+    right = "save its columns, for a table by writetable(T, 'FILE.csv')"
+    return unreadable(f"contains an object of MATLAB, which taxel does not read; {right}", path)
 
 
 def _of_dataset(data: h5py.Dataset, *, is_matlab: bool = False) -> _Stored:

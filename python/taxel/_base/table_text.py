@@ -6,7 +6,7 @@ import gzip
 import io
 import json
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from itertools import islice
@@ -21,7 +21,7 @@ from taxel._base.documents import mark_of
 from taxel._base.errors import damaged, unreadable
 from taxel._base.messages import first_line, installing
 
-__all__ = ["SHEETS", "TEXTS", "Text", "beginning", "marked"]
+__all__ = ["SHEETS", "TEXTS", "Text", "beginning", "marked", "read_parquet", "values_in"]
 
 #: The endings of tables of text, also compressed by gzip, and of tables that pandas reads as a whole.
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".json", ".jsonl", ".ndjson")
@@ -183,24 +183,10 @@ class Text:
             return None
         import pandas as pd  # noqa: PLC0415  takes long
 
-        try:
-            table = pd.read_parquet(self.path)
-        except Exception as error:  # of pyarrow
-            raise self._damaged(error) from None
+        table = read_parquet(self.path)
         named = table if type(table.index) is pd.RangeIndex else table.reset_index()
         columns = (each for name in named.columns for each in _columns_in(str(name), named[name]))
         return pd.DataFrame(dict(columns))
-
-    def _damaged(self, error: Exception) -> Exception:
-        """Return the error of a table that pandas does not read."""
-        if isinstance(error, ImportError):
-            text = f"to read it, taxel needs pandas with openpyxl and pyarrow: {installing('tables')}"
-            return ImportError(f"{self.path}: {text}")
-        if self.path.suffix.lower() != ".parquet" and beginning(self.path, 4) == b"\xd0\xcf\x11\xe0":
-            return unreadable(
-                "is encrypted, or of an older kind; save it without a password, as .xlsx or .csv", self.path
-            )
-        return damaged(self.path, f"{self.path.suffix} file", first_line(error))
 
     @cached_property
     def _sheet(self) -> str:
@@ -232,7 +218,35 @@ class Text:
         try:
             return dict(pd.read_excel(self.path, sheet_name=None, header=None, dtype=object))
         except Exception as error:  # of zipfile, of XML
-            raise self._damaged(error) from None
+            raise _damaged(self.path, error) from None
+
+
+def read_parquet(path: Path, columns: Sequence[str] | None = None) -> Any:
+    """Return the DataFrame of a table of Parquet, of all columns or of some.
+
+    Raises
+    ------
+    FormatError : damaged, or there is no such column
+    ImportError : the extra ``tables`` is not installed
+    """
+    import pandas as pd  # noqa: PLC0415  takes long
+
+    try:
+        return pd.read_parquet(path, columns=columns)
+    except OSError:
+        raise
+    except Exception as error:  # of pyarrow
+        raise _damaged(path, error) from None
+
+
+def _damaged(path: Path, error: Exception) -> Exception:
+    """Return the error of a table that pandas does not read."""
+    if isinstance(error, ImportError):
+        text = f"to read it, taxel needs pandas with openpyxl and pyarrow: {installing('tables')}"
+        return ImportError(f"{path}: {text}")
+    if path.suffix.lower() != ".parquet" and beginning(path, 4) == b"\xd0\xcf\x11\xe0":
+        return unreadable("is encrypted, or of an older kind; save it without a password, as .xlsx or .csv", path)
+    return damaged(path, f"{path.suffix} file", first_line(error))
 
 
 def _columns_in(name: str, column: Any) -> Iterator[tuple[str, Any]]:
@@ -242,7 +256,7 @@ def _columns_in(name: str, column: Any) -> Iterator[tuple[str, Any]]:
         yield name, column
         return
     try:
-        values = np.stack([_values_in(cell) for cell in column])
+        values = np.stack([values_in(cell) for cell in column])
     except ValueError:
         yield name, column.map(str)
         return
@@ -250,10 +264,10 @@ def _columns_in(name: str, column: Any) -> Iterator[tuple[str, Any]]:
         yield name + "".join(f"[{k}]" for k in place), values[:, *place]
 
 
-def _values_in(cell: Any) -> NDArray[Any]:
+def values_in(cell: Any) -> NDArray[Any]:
     """Return the values of a list in a cell, or of lists in it, as arrays of pyarrow hold them."""
     values = np.asarray(cell)
-    return np.stack([_values_in(each) for each in cell]) if values.dtype == object and len(values) else values
+    return np.stack([values_in(each) for each in cell]) if values.dtype == object and len(values) else values
 
 
 def _rows_in(document: Any) -> Any:

@@ -19,13 +19,14 @@ from taxel.cli._say import say
 from taxel.cli._task import OutOption, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import App, Flat
 from taxel.detections import Detections
+from taxel.formats.lerobot import check_target
 from taxel.options import DetectOptions, Reading
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from taxel.detect import Outcome, PlainRule, Readout
+    from taxel.detect import PlainRule, Readout
     from taxel.tasks import Detected, Detecting
 
 app = App(name="detect")
@@ -66,12 +67,13 @@ def detect(
     lists
         Print all detections. Default: the first 40 of each recording, and with --truth none.
     out
-        Write the detections to this .csv.
+        Write the detections to this .csv; those in a data set of LeRobot, by frames of its episodes, or to a .parquet.
     report
         Write a report to this folder, with potential, weights, errors and the worst events.
     """
     output.check(out)
     output.check_report(report)
+    check_target(out, recordings)
     given = one_or_several(truth) if truth else None
     loaded = taxel.detect.load(readout)
     with progress(output.json) as update:
@@ -82,7 +84,7 @@ def detect(
         found = replace(found, warnings=(*unread, *found.warnings))
     used = loaded.using(options.use) if isinstance(loaded, taxel.Readout) else loaded
     if out is not None:
-        write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=output.overwrite)
+        write_whole(out, lambda file: file.write(_table(found, out.suffix.lower())), overwrite=output.overwrite)
     say_warnings(found.warnings)
     against = paths_text(list(map(Path, truth))) if truth else None
     printed = list(_lines(found, used, recordings, against, given=options.tare is not None, lists=lists))
@@ -163,14 +165,23 @@ def _result(recordings: Sequence[Path], readout: Path, found: dict[str, Any]) ->
     return {"readout": str(readout), **place, "recordings": each, **found}
 
 
-def _table(outcomes: Sequence[Outcome]) -> str:
-    """Return the detections as a table; of several recordings each row begins with its recording's name."""
+def _table(found: Detecting, ending: str) -> bytes:
+    """Return the detections as a table; of several recordings each row begins with its recording's name.
+
+    Of a data set it joins with its tables, by episode and frame.
+    """
+    outcomes = found.outcomes
+    if (of_episodes := found.by_frame()) is not None:
+        written: bytes = (
+            of_episodes.to_parquet(index=False) if ending == ".parquet" else of_episodes.to_csv(index=False).encode()
+        )
+        return written
     if len(outcomes) == 1:
-        return outcomes[0].found._csv()
+        return outcomes[0].found._csv().encode()
     # All recordings share one header.
     repaired = any(outcome.found.repaired.any() for outcome in outcomes)
     tables = [outcome.found._csv(repaired, Path(outcome.name).name) for outcome in outcomes]
-    return tables[0] + "".join(table.partition("\n")[2] for table in tables[1:])
+    return (tables[0] + "".join(table.partition("\n")[2] for table in tables[1:])).encode()
 
 
 def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, several: bool) -> Iterator[str]:

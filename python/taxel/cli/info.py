@@ -242,7 +242,6 @@ def _lines(pressed: Series) -> Iterator[str]:
 
 def _page(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording as lines for people."""
-    from taxel.formats.layout import layout_name  # noqa: PLC0415
     from taxel.formats.roles import SURE, Role, lines_of  # noqa: PLC0415
     from taxel.recording import kind_of_file  # noqa: PLC0415
 
@@ -257,7 +256,7 @@ def _page(facts: dict[str, Any]) -> list[str]:
         lines += ["roles of its columns; ~ is assumed:", *lines_of([Role(**role) for role in facts["roles"]])]
     if facts["layout"]:
         lines += [
-            f"read by this layout, which {layout_name(Path(facts['file']))} may state:",
+            f"read by this layout, which {facts['layout_file']} may state:",
             *facts["layout"].splitlines(),
         ]
     return [*lines, *([f"table written to {facts['table']}"] if "table" in facts else [])]
@@ -285,6 +284,8 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         if facts.get("on_share") is not None:
             words = f"{100 * facts['on_share']:.1f} % on"
         yield "events", f"{facts['events']}, {words}"
+        if facts["bursts_us"]:
+            yield "resolution", f"times come in bursts {facts['bursts_us'] / 1e3:.3g} ms apart, and are no finer"
     else:
         yield ("samples" if "columns" in facts else "frames"), f"{facts['frames']} ({facts['unit']})"
         yield from _flaws(facts)
@@ -314,7 +315,9 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what frames lack: values and times."""
+    """Yield what frames lack: values and times, and new values."""
+    if (rate := facts["values_per_s"]) and facts["frames_per_s"] > 1.5 * rate:
+        yield "repeated values", f"frames repeat their values, which change at {rate:.3g} Hz at most: the sensor's rate"
     if facts["missing"]["values"]:
         yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
     if (gaps := facts["gaps"]) is not None and "gaps" not in facts["verdict"].noted:

@@ -23,6 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 from taxel.recorded import unit_of as recorded_unit
+from taxel.recording.frames import value_us
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
@@ -212,8 +213,8 @@ def unit_of(examples: Sequence[Example]) -> str | None:
 
 
 def frame_ms(source: object) -> float:
-    """Return the median distance of frames, ms; 0 of what are no frames, or fewer than two."""
-    return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0
+    """Return the median distance of frames with new values, ms; 0 of what are no frames, or fewer than two."""
+    return to_ms(value_us(source)) if isinstance(source, Frames) else 0.0
 
 
 def unreliable(label: str, scored: Score, labels: str, on: str = "this readout") -> str:

@@ -3,37 +3,51 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from taxel._base.arrays import read_arrays, shapes
 from taxel._base.errors import unreadable
-from taxel._base.messages import counted
-from taxel.events import Events
+from taxel._base.messages import counted, warn
 from taxel.formats.column_names import AXES, time_unit
 from taxel.formats.layout import Data, Layout, advice
 from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
-from taxel.formats.roles import LIKELY, OPEN, SURE, Changes, Question, Role
+from taxel.formats.roles import LIKELY, OPEN, SURE, Changes, Question, Role, named
 from taxel.formats.times import in_order, unit_of_times
-from taxel.frames import Frames
 from taxel.reading import InMemory
+
+#: The path of a numbered group within others: data/demo_0/ of data/demo_0/obs/tactile.
+_NUMBERED = re.compile(r"(?:[^/]*[^/\d]/)*[^/]*\d+/")
+#: Numbered groups of these names are parts of a body, at one time.
+_PARTS = re.compile(r"sensor|taxel|finger|hand|foot|skin|patch|pad|device|board|channel|node|module", re.IGNORECASE)
 
 
 def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
     """Return a reader of the frames of a file of arrays, of each trial and each axis.
 
+    Trials are along an axis, or are the groups of a HDF5 file, as robots' episodes are: data/demo_0/obs/tactile.
+
     Raises
     ------
     FormatError : no such array, several that may hold the frames, or axes that can be read in two ways (prints both)
     """
-    how, said, roles, stored = look(path, layout)
-    shape = stored[how.array or ""]
+    groups = _groups(shapes(path), layout)
+    if len(groups) > 1:
+        warn(f"{path.name}: its groups are trials: {named([*groups])}", stacklevel=6)
+    return [each for name, group in groups.items() for each in _read_group(path, layout, group, name)]
+
+
+def _read_group(path: Path, layout: Layout, group: Group, trial: str) -> list[InMemory]:
+    """Return the readers of the arrays of a file, or of the group of a trial."""
+    how, said, roles = look_at(path, layout, group)
+    shape = group.shapes[how.array or ""]
     named = (how.axes or "").split()
     if len(named) != len(shape):
         raise unreadable(
@@ -41,15 +55,13 @@ def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
             f"{len(named)}: axes = {how.axes!r}",
             path,
         )
-    wanted = [how.array or "", *([how.time] if isinstance(how.time, str) else [])]
-    arrays = read_arrays(path, wanted, {wanted[0]: np.float32})
-    values = _in_order(path, arrays[wanted[0]], named, how)
+    values = _in_order(path, group.read(path, how.array or "", np.float32), named, how)
     frames = values.shape[1]
     t = np.arange(frames, dtype=np.int64)
     if how.time is not None:
         import pandas as pd  # noqa: PLC0415  takes long
 
-        times = arrays[how.time] if isinstance(how.time, str) else _of_column(path, how.time, named, how)
+        times = group.read(path, how.time) if isinstance(how.time, str) else _of_column(path, group, named, how)
         if times.size != frames or times.dtype.kind not in "uif":
             stated = f"{counted(times.size, 'time')} ({times.dtype}) for {counted(frames, 'frame')}"
             raise unreadable(f"{how.time} contains {stated}", path)
@@ -59,44 +71,91 @@ def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
         values = values if isinstance(how.time, str) else np.delete(values, how.time - 1, axis=3)
     full = replace(layout, data=replace(how, array=how.array or None))
     values = values if values.shape[-1] > 1 else values[..., 0]
-    sources: dict[str, Frames | Events] = {}
-    for k, trial in enumerate(values, 1):
-        sources.update(sources_of(path, full, f"trial{k}" if len(values) > 1 else "", trial, t))
-    unread = ", ".join(name for name in stored if name not in wanted)
+    unread = ", ".join(name for name in group.shapes if name not in (how.array or "", how.time))
     lost = (f"other arrays of the file: {unread}",) if unread else ()
-    return readers_of(path, "arrays", sources, full, said, timed=how.time is not None, lost=lost, roles=roles)
+    readers = list[InMemory]()
+    for k, of_trial in enumerate(values, 1):
+        sources = dict(sources_of(path, full, "", of_trial, t))
+        # What was understood is said once.
+        new = () if readers or group.number else said
+        found = readers_of(path, "arrays", sources, full, new, timed=how.time is not None, lost=lost, roles=roles)
+        name = " ".join(filter(None, (trial, f"trial{k}" * (len(values) > 1))))
+        readers += [replace(each, facts=replace(each.facts, name=name or each.facts.name)) for each in found]
+    return readers
 
 
-def _of_column(path: Path, number: int, named: Sequence[str], how: Data) -> NDArray[Any]:
+@dataclass(frozen=True)
+class Group:
+    """Hold the shapes of the arrays of a file, or of those of a trial, by their names below a path."""
+
+    shapes: Mapping[str, tuple[int, ...]]
+    path: str = ""
+    number: int = 0
+
+    def read(self, path: Path, name: str, dtype: DTypeLike | None = None) -> NDArray[Any]:
+        """Return one of the arrays."""
+        whole = self.path + name
+        return read_arrays(path, [whole], None if dtype is None else {whole: dtype})[whole]
+
+
+def _groups(stored: Mapping[str, tuple[int, ...]], layout: Layout) -> dict[str, Group]:
+    """Return the groups of arrays that are trials, by their names, if numbered groups hold arrays of like names."""
+    found: dict[str, dict[str, tuple[int, ...]]] = {}
+    for name, shape in stored.items():
+        if numbered := _NUMBERED.match(name):
+            found.setdefault(numbered[0], {})[name[numbered.end() :]] = shape
+    stems = {re.sub(r"\d+/$", "", group) for group in found}
+    common = set[str]().union(*found.values()).intersection(*found.values())
+    is_stated = layout.data is not None and layout.data.array is not None and layout.data.array.strip("/") in stored
+    if len(found) < 2 or len(stems) > 1 or not common or is_stated or any(map(_PARTS.search, stems)):
+        return {"": Group(stored)}
+    order = sorted(found, key=lambda group: int(re.findall(r"\d+", group)[-1]))
+    return {
+        group.strip("/").rpartition("/")[2]: Group(
+            {name: found[group][name] for name in found[group] if name in common}, group, k
+        )
+        for k, group in enumerate(order)
+    }
+
+
+def _of_column(path: Path, group: Group, named: Sequence[str], how: Data) -> NDArray[Any]:
     """Return the times that are a taxel of the array, as it is stored: frames have 32 bits."""
-    stored = read_arrays(path, [how.array or ""])[how.array or ""]
+    stored, number = group.read(path, how.array or ""), int(how.time or 0)
     if sorted(named) != ["taxel", "time"] or number > stored.shape[named.index("taxel")]:
         raise unreadable(f"[data] time is {number}, but the array has no such taxel", path)
     times: NDArray[Any] = np.take(stored, number - 1, axis=named.index("taxel"))
     return times
 
 
-def look(path: Path, layout: Layout) -> tuple[Data, list[str], list[Role], dict[str, tuple[int, ...]]]:
-    """Return how the arrays of a file are read, what was guessed of it, what each is, and their shapes.
-
-    The frames are not read.
+def look(path: Path, layout: Layout) -> None:
+    """Refuse a file of arrays that cannot be read; the frames are not read.
 
     Raises
     ------
     FormatError : as of `read_array_file`
     """
-    stored = shapes(path)
+    look_at(path, layout, next(iter(_groups(shapes(path), layout).values())))
+
+
+def look_at(path: Path, layout: Layout, group: Group) -> tuple[Data, list[str], list[Role]]:
+    """Return how the arrays of a file or of a trial are read, what was guessed of it, and what each is.
+
+    Raises
+    ------
+    FormatError : as of `read_array_file`
+    """
+    stored = group.shapes
     if not stored:
         struct = "; if the data are in a struct, save its fields: save('FILE.mat', '-struct', 'NAME')"
         raise unreadable(
             f"contains no numbers; must hold an array of numbers{struct * (path.suffix.lower() == '.mat')}", path
         )
     how = _named(path, layout.data or Data(), stored)
-    full, said, roles, questions = _axes(path, layout, how, stored)
+    full, said, roles, questions = _axes(path, layout, how, group)
     questions = [question for question in questions if not question.keys & layout.stated]
     refuse_open(path, f"contains {_list(stored)}, which can be read in", full, roles, questions)
     assert full.data is not None  # it is that of the axes
-    return full.data, said, roles, stored
+    return full.data, said, roles
 
 
 def _size(shape: Sequence[int]) -> str:
@@ -133,15 +192,14 @@ def _named(path: Path, how: Data, stored: Mapping[str, tuple[int, ...]]) -> Data
     return replace(how, array=frames[0])
 
 
-def _axes(
-    path: Path, layout: Layout, how: Data, stored: Mapping[str, tuple[int, ...]]
-) -> tuple[Layout, list[str], list[Role], list[Question]]:
+def _axes(path: Path, layout: Layout, how: Data, group: Group) -> tuple[Layout, list[str], list[Role], list[Question]]:
     """Return the layout with what each axis counts, what was guessed of it, what each array is, and what is open.
 
     Raises
     ------
     FormatError : an array that holds no frames
     """
+    stored = group.shapes
     shape, called = stored[how.array or ""], how.array or "the array"
     if 0 in shape:
         raise unreadable(f"{called} is empty ({_size(shape)})", path)
@@ -168,12 +226,16 @@ def _axes(
         axis = shape.index(counts[time]) if time in fits else int(np.argmax(shape))
         said.append(f"axis {axis} ({shape[axis]}) is the time")
     if isinstance(time, str) and how.time is None:
-        how = _timed(path, layout, how, time, questions)
+        how = _timed(layout, how, time, group.read(path, time), questions)
         said.append(f"time {time!r} in {how.time_unit}")
     likely: dict[str, Changes] = {f"axis {axis} ({shape[axis]}) is the time": {"axes": with_time_at(axis)}}
     if time is None:
         likely |= {f"axis 0 ({shape[0]}) is the time": {"axes": with_time_at(0)}} if axis else {}
-        likely = {**_with_time_in_it(path, how, shape), **likely} if axis == 0 and len(shape) == 2 else likely
+        likely = (
+            {**_with_time_in_it(group.read(path, how.array or "")), **likely}
+            if axis == 0 and len(shape) == 2
+            else likely
+        )
     others = [name for name, size in stored.items() if size == shape[:1] and name not in (how.array, time)]
     if len(shape) > 2 and axis == 1 and others:
         trials = "trial time taxel" if len(shape) == 3 else "trial time row column"
@@ -202,9 +264,9 @@ def _axes(
     return replace(layout, data=how), said, roles, questions
 
 
-def _timed(path: Path, layout: Layout, how: Data, time: str, questions: list[Question]) -> Data:
+def _timed(layout: Layout, how: Data, time: str, stored: NDArray[Any], questions: list[Question]) -> Data:
     """Return the same with an array of times and their unit; ask for it if it is open."""
-    times = read_arrays(path, [time])[time].ravel().astype(np.float64)
+    times = stored.ravel().astype(np.float64)
     unit, possible = time_unit(time) or "", dict[str, float]()
     if not unit and "time_unit" not in layout.stated:
         unit, possible = unit_of_times(times)
@@ -214,11 +276,11 @@ def _timed(path: Path, layout: Layout, how: Data, time: str, questions: list[Que
     return replace(how, time=time, time_unit=how.time_unit if "time_unit" in layout.stated else unit)
 
 
-def _with_time_in_it(path: Path, how: Data, shape: Sequence[int]) -> dict[str, Changes]:
+def _with_time_in_it(values: NDArray[Any]) -> dict[str, Changes]:
     """Return the layout of an array whose first taxel ascends in like steps, as the time does; none of others."""
-    if shape[1] < 2:
+    if values.shape[1] < 2:
         return {}
-    column = read_arrays(path, [how.array or ""])[how.array or ""][:, 0]
+    column = values[:, 0]
     steps = np.diff(column.astype(np.float64)) if column.dtype.kind in "uif" else np.empty(0)
     if len(steps) < len(AXES) or not (steps > 0).all() or steps.max() > 2 * steps.min():
         return {}

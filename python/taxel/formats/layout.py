@@ -145,10 +145,6 @@ class Table:
         """Whether a column of this name may be a taxel."""
         return self.keep is None or fnmatchcase(name, self.keep)
 
-    def is_between(self, line: str) -> bool:
-        """Whether a line holds no numbers, but separates frames."""
-        return not line.strip() or (self.frame_begin is not None and line.lstrip().startswith(self.frame_begin))
-
 
 def _check_end(how: Table | PrintedFrames) -> None:
     """Refuse a table that does not state in one way where a frame of several lines ends."""

@@ -223,7 +223,7 @@ def _have_units_behind_decimals(lines: Sequence[str]) -> bool:
     """Return whether a decimal comma is in the numbers that have a unit behind them, between other separators."""
     behind = ((line, unit.start()) for line in lines for unit in UNIT_BEHIND.finditer(line))
     found = [re.split(r"[;\s]", line[:end])[-1] for line, end in behind if ";" in line or "\t" in line]
-    return bool(found) and all("," in number for number in found)
+    return any("," in number for number in found) and not any("." in number for number in found)
 
 
 def _fit(

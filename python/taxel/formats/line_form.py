@@ -15,6 +15,7 @@ from taxel.formats.column_names import time_unit
 from taxel.formats.form import Form, place_of, places_of
 from taxel.formats.layout import Layout, PrintedFrames
 from taxel.formats.line_fits import FITS, fits_in
+from taxel.formats.parts import sensors_in
 from taxel.formats.roles import SURE
 from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, find_taxels, said_of, time_of
 from taxel.formats.table_form import draft_of, lines_between_blanks
@@ -46,7 +47,7 @@ def form_of_lines(
 
     Raises
     ------
-    ProblemError : columns that are not there, or lines that can be read in two ways
+    ProblemError : columns that are not there, or lines that can be read in two ways, or are of several sensors
     """
     draft = _reading_of_lines(lines, stated, size)
     if draft is None:
@@ -108,6 +109,9 @@ def form_of_lines(
 
 def _reading_of_lines(lines: Sequence[str], stated: PrintedFrames, size: int | None) -> Draft | None:
     """Return lines as the form reads them that fits best, with the stated names of columns; None if none fits."""
+    if several := sensors_in(lines):
+        right = "a live source is of one; print each to a place of its own"
+        raise ProblemError(f"lines are of {', '.join(several)} in turn: {right}")
     wanted = stated_count(stated, size)
     found, _ = fits_in(lines, lambda: lines, wanted)
     fits = sorted(found, key=lambda fit: (wanted is not None and fit.count != wanted, -fit.score))

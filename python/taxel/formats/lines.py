@@ -15,6 +15,7 @@ from functools import cache
 
 from taxel._base.messages import counted
 from taxel.formats.column_names import UNIT_BEHIND
+from taxel.formats.times import DATE
 
 #: How the cells of a line are found: between separators; where marks and names are between them too; JSON; hex.
 KINDS = ("plain", "marked", "json", "hex")
@@ -47,7 +48,7 @@ _BETWEEN = {".": re.compile(r"[\s,;]+"), ",": re.compile(r"[\s;]+")}
 #: A name before a number or a bracket, which a colon or an equals sign ends.
 _NAME = re.compile(r"(?<![\w.])[\"']?([^\W\d][\w.%/-]*(?:\[\d+\])*)[\"']?\s*[:=]\s*(?=[-+.\d\[({\"'])")
 #: The blank between a day and a time, which separates no cells.
-_DAY = re.compile(r"(\d{4}-\d\d-\d\d|\d{4}/\d\d?/\d\d?|\d\d?\.\d\d?\.\d{4}|\d\d?-[A-Z][a-z]{2}-\d{4}) +(?=\d\d?:\d\d)")
+_DAY = re.compile(rf"({DATE}) +(?=\d\d?:\d\d)", re.ASCII)
 
 
 def has_marks(line: str) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 
 from taxel._base.errors import unreadable
 from taxel._base.table_text import Text
@@ -31,16 +32,20 @@ def parts_of(text: Text, how: Table | None) -> tuple[dict[str, Text], list[str]]
         chosen = [stated] if stated is not None else same or [largest]
         parts = {name if len(chosen) > 1 else "": text.of_sheet(name) for name in chosen}
         return parts, [name for name in sheets if name not in chosen and len(sheets[name])]
-    names = _sensors(text)
-    of_one = {name: text.of_lines(lambda line, name=name: _sensor(line, names) == name) for name in names}  # type: ignore[misc]
+    names = sensors_in(text.head) if text.is_file else {}
+    of_one = {name: text.of_lines(lambda line, name=name: sensor_of(line, names) == name) for name in names}  # type: ignore[misc]
     return of_one or {"": text}, []
 
 
-def _sensors(text: Text) -> dict[str, frozenset[str]]:
-    """Return the sensors that lines name, one a line in turn, with the names that only lines of each have."""
-    if not text.is_file:
-        return {}
-    lines = [line for line in text.head[:_LINES] if line.strip()]
+def sensors_in(first: Sequence[str]) -> dict[str, frozenset[str]]:
+    """Return the sensors that the first lines name, one a line in turn, with the names that only lines of each have.
+
+    Examples
+    --------
+    >>> sorted(sensors_in(["left: 1,2", "right: 3,4"] * 4)), sensors_in(["left: 1,2"] * 8)
+    (['left', 'right'], {})
+    """
+    lines = [line for line in first[:_LINES] if line.strip()]
     if 2 * sum(map(has_marks, lines[:20])) < len(lines[:20]) or not lines:
         return {}
     counts = Counter(map(_names, lines))
@@ -51,7 +56,7 @@ def _sensors(text: Text) -> dict[str, frozenset[str]]:
     return {" ".join(sorted(names)): names for names in own} if len(own) > 1 and apart else {}
 
 
-def _sensor(line: str, sensors: dict[str, frozenset[str]]) -> str:
+def sensor_of(line: str, sensors: dict[str, frozenset[str]]) -> str:
     """Return the sensor that a line names; "" if none."""
     names = _names(line)
     return next((name for name, own in sensors.items() if own <= names), "")

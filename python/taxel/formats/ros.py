@@ -9,7 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import reduce
 from itertools import islice, pairwise
 from pathlib import Path
@@ -25,6 +25,7 @@ from taxel._base.messages import counted, first_line, installing, warn
 from taxel._core import Error, FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.column_names import says
+from taxel.formats.roles import FIRST, Role
 from taxel.formats.times import repaired
 from taxel.frames import Frames
 from taxel.labels import source_of
@@ -380,7 +381,7 @@ def _readers(
     kind, names, trouble, messages = "", tuple[str, ...](), "", list[_Message]()
     # A message has names where the first with values has some.
     keys: dict[str, list[str]] | None = None
-    are_named = True
+    are_named, roles = True, list[Role]()
     for connection, at, data in bag.messages([each for each in bag.connections if each.topic == topic]):
         message = bag.deserialize(data, connection.msgtype)
         kind = _type(message)
@@ -389,7 +390,7 @@ def _readers(
             values, names = _ordered(message, field, names, are_named=are_named)
             if values.size and keys is None:
                 keys = {name: name.split(".") for name in _texts(message)} if by is None else {}
-                are_named = bool(names)
+                are_named, roles = bool(names), _roles(message, field, by)
             key = "" if not by else str(reduce(getattr, by.split("."), message))
         except LookupError as error:
             values, key, trouble = np.empty(0), "", str(error.args[0])
@@ -428,8 +429,18 @@ def _readers(
             label=source_of(f"{name}_{key}") if key else name,
             source=topic + f".{field}" * bool(field) + f" ({kind})",
             lost=lost,
+            roles=tuple(map(asdict, roles)),
         )
         yield _reader(location, facts, of_key, said, short)
+
+
+def _roles(message: Any, field: str, by: str | None) -> list[Role]:
+    """Return what the time, the field that says the sensor, and each field of numbers of a message is."""
+    stamp = "header.stamp" if hasattr(getattr(message, "header", None), "stamp") else "time of the bag"
+    roles = [Role(stamp, role="time"), *[Role(by, role="sensor", why="stated") for by in [by] if by]]
+    first = [f"{value:g}" for value in _values(message, field).reshape(-1)[:FIRST].tolist()]
+    others = (Role(name, role="no taxel", why="not chosen") for name in _paths(message) if name != field)
+    return [*roles, Role(field, first), *others]
 
 
 def _only_field(message: Any) -> str:

@@ -40,6 +40,8 @@ ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
 _CELLS = 1 << 21
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
+#: Lines of events are swapped by at most so much, us.
+_SWAPPED_US = 1_000_000
 #: The least and the largest value of the columns of events.
 _EVENTS = {"x": (0, 65_534), "y": (0, 65_534), "p": (-1, 1), "intensity": (0, 65_535), "repaired": (0, 1)}
 
@@ -134,7 +136,7 @@ def _read_part(
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said(), *more]
     said, notes = [*form.said, *rows.odd.said(), *more], dict[str, list[Note]]()
     if how.events:
-        sources = {part: _events(path, full, form, rows, array)}
+        sources = {part: _events(path, full, form, rows, array, said)}
         shape = sources[part].array.shape
         if array is None and layout.rows is None:
             said.append(f"{shape[0]} x {shape[1]} taxels assumed, which the table does not state")
@@ -305,7 +307,7 @@ def _line_by_line(text: Text, form: Form) -> Rows:
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
         if number <= form.first and not is_begin:
             continue
-        if is_begin or how.is_between(line) or not line.strip(f"\t ;,{how.separator}"):
+        if is_begin or not line.strip(f"\t ;,{how.separator}"):
             waiting = True
             if is_begin and how.frame_time is not None:
                 found = _NUMBER.findall(line)
@@ -434,21 +436,28 @@ def _labels(form: Form, beside: Any, t: NDArray[np.int64]) -> list[Note]:
     return [Note(f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes]
 
 
-def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | None) -> Events:
-    """Return the events of a table with a line each."""
+def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | None, said: list[str]) -> Events:
+    """Return the events of a table with a line each; the lines of two sensors that a host asks may be swapped."""
     names = [form.names[k].lower() for k in form.taxels]
     names = [EVENT_COLUMNS.get(name, name) for name in names]
-    if sorted(names) != ["p", "x", "y"]:
-        raise unreadable(f"the columns other than the time are {', '.join(names)}; must be x, y, p for events", path)
+    right = ({"x", "y"}, {"taxel"}), ({"p"}, {"is_negative"})
+    if {*names} not in [place | rises for place in right[0] for rises in right[1]]:
+        wrong = f"the columns other than the time are {', '.join(names)}"
+        raise unreadable(f"{wrong}; must be x, y, p, or taxel, p, for events", path)
     try:
-        return events_of(path, form, names, rows, array if layout.rows is None else layout.array(1))
+        events = events_of(path, form, names, rows, array if layout.rows is None else layout.array(1))
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
+    late = np.maximum.accumulate(events.t) - events.t
+    back = np.flatnonzero(late)
+    if len(back) > ODD * len(late) or late.max(initial=0) > _SWAPPED_US:
+        line = rows.line(int(back[0]), path, form.first)
+        raise unreadable("the time is before that of the line above", path, line=line)
+    said += [f"{counted(len(back), 'line')} out of order, sorted by time"] * bool(len(back))
+    return events[np.argsort(events.t, kind="stable")] if len(back) else events
 
 
-def events_of(
-    path: Path, form: Form, names: Sequence[str], rows: Rows, array: Array | None, *, ascending: bool = True
-) -> Events:
+def events_of(path: Path, form: Form, names: Sequence[str], rows: Rows, array: Array | None) -> Events:
     """Return the events of a table with a line each; several may have the same time.
 
     Parameters
@@ -456,12 +465,10 @@ def events_of(
     path : Path
     form : Form
     names : sequence of str
-        Of the columns but the time: x, y, p, and perhaps intensity and repaired.
+        Of the columns but the time: x and y, or the taxel; p, or is_negative; and perhaps intensity and repaired.
     rows : Rows
     array : Array, optional
         Default: one large enough.
-    ascending : bool
-        Whether a time that is before that of the line above is refused.
 
     Raises
     ------
@@ -469,6 +476,11 @@ def events_of(
     ProblemError : events outside the array
     """
     by_name = dict(zip(names, rows.values.T, strict=True))
+    if (taxel := by_name.pop("taxel", None)) is not None:
+        array = array or Array(1, 1 + int(np.nanmax(taxel, initial=0)))
+        by_name["y"], by_name["x"] = np.divmod(taxel, array.columns)
+    if (falls := by_name.pop("is_negative", None)) is not None:
+        by_name["p"] = 1 - falls
     present = ~np.isnan(by_name["intensity"]) if "intensity" in by_name else None
     for name, column in by_name.items():
         least, most = _EVENTS[name]
@@ -479,10 +491,9 @@ def events_of(
             line = rows.line(int(wrong[0]), path, form.first)
             raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", path, line=line)
     us = us_of(rows.times, form.unit_of_times)
-    back = np.flatnonzero(~(np.diff(us, prepend=us[:1]) >= 0) if ascending else np.isnan(us))
-    if len(back):
-        line = rows.line(int(back[0]), path, form.first)
-        raise unreadable("the time is before that of the line above, or is none", path, line=line)
+    none = np.flatnonzero(np.isnan(us))
+    if len(none):
+        raise unreadable("the time is none", path, line=rows.line(int(none[0]), path, form.first))
     x, y = by_name["x"].astype(np.uint16), by_name["y"].astype(np.uint16)
     more: dict[str, Any] = {"repaired": by_name["repaired"] > 0} if "repaired" in by_name else {}
     if present is not None:

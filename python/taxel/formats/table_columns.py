@@ -20,7 +20,7 @@ from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
 from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named
-from taxel.formats.times import ISO, is_of_two_numbers, unit_of_times
+from taxel.formats.times import ISO, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, that one counts lines, and what values stay.
 _ASCENDS, _COUNTS, _STAYS = 8, 20, 40
@@ -32,8 +32,11 @@ _BLOCKS = 64
 _SERIES = 4
 #: A number with other text behind it, which is no date, time or address.
 _GLUED = re.compile(r"[-+]?\d+(?:[.,]\d+)?[ \t]*[^\s\d:/.,-]")
-#: Names of the columns of events.
+#: Hours and minutes, or as well minutes and seconds.
+_TWO_NUMBERS = re.compile(r"\d{1,2}:\d\d", re.ASCII)
+#: Names of the columns of events: a place, or the number of a taxel, and whether it rises, or falls.
 EVENT_COLUMNS = {"col": "x", "column": "x", "row": "y", "pol": "p", "polarity": "p", "on": "p"}
+EVENT_COLUMNS |= dict.fromkeys(("address", "addr", "taxel_id"), "taxel")
 
 
 @dataclass
@@ -136,7 +139,7 @@ def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
     if not draft.is_stated("time_unit"):
         is_text = fit.types[column] == "time"
         draft.set(time_unit=ISO if is_text else "s" if len(places) > 1 else _unit_of_time(draft, column))
-        if is_text and all(map(is_of_two_numbers, fit.cells(column))):
+        if is_text and all(map(_TWO_NUMBERS.fullmatch, fit.cells(column))):
             example = fit.cells(column)[-1]
             why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
             draft.ask(why, "time_unit", {"hours and minutes": {"time_unit": ISO}}, column)
@@ -355,6 +358,8 @@ def by_key(draft: Draft, time: int | None, all_lines: Callable[[], Iterable[str]
     If each time has one reading of each key, these are the taxels of an array.
     """
     fit, called, taxels = draft.fit, draft.called, draft.taxels
+    if time is not None and _addresses(draft, time):
+        return
     grid = _grid(draft, taxels)
     keys = [] if draft.key is None and not grid else grid or [draft.key or 0]
     if not keys or draft.is_stated("by", "taxel_column", "leave_out", "keep"):
@@ -471,6 +476,18 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
         draft.ask(f"may be no taxels: {what}", "leave_out keep", choices, *asked)
 
 
+def say_contradictions(draft: Draft, text: Text) -> None:
+    """Say which columns that hold labels or a key by the first lines have many other values later."""
+    few = [k for k, role in enumerate(draft.roles) if role.role in ("label", "sensor") and role.certainty == LIKELY]
+    fit = draft.fit.over(text.spread) if few else draft.fit
+    for k in few:
+        later = {cells[k] for cells in fit.spread} - {*fit.cells(k)} - {*MISSING}
+        if len(later) > _KEYS:
+            draft.said.append(
+                f"{draft.called(k)} has {len(later)} other values in later lines, as {named(sorted(later)[:2])}"
+            )
+
+
 def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
     """Leave out a column that ascends evenly beside the time; where the time repeats, ask which it is."""
     draft.be("counter" if draft.fit.counts(other) else "no taxel", "ascends evenly, as a time does", other)
@@ -502,11 +519,13 @@ def are_events(draft: Draft, time: int | None) -> bool:
 
     The rate of events says nothing of the unit of their times, as that of frames does: without a name it is asked.
     """
+    addresses = [] if time is None else _addresses(draft, time)
+    draft.be("taxel", "", *addresses)
     fit, taxels, units = draft.fit, draft.taxels, ("us", "ms", "s")
     choices: dict[str, Changes]
     called = {EVENT_COLUMNS.get(name, name): k for k in taxels for name in [draft.names[k].lower()]}
     named = [called[name] for name in "xyp" if name in called]
-    if time is not None and len(taxels) == len(named) == 3 and _are_places(fit, named):
+    if time is not None and (addresses or (len(taxels) == len(named) == 3 and _are_places(fit, named))):
         draft.set(events=True)
         draft.answer("time_unit")
         if not draft.is_stated("time_unit") and not (
@@ -524,6 +543,17 @@ def are_events(draft: Draft, time: int | None) -> bool:
             draft.ask("frames or events", "events", choices, first=True)
             break
     return False
+
+
+def _addresses(draft: Draft, time: int) -> list[int]:
+    """Return the columns of the taxel and the polarity of events, if a table has only these beside the time."""
+    others = {draft.names[k].lower(): k for k in range(len(draft.names)) if k != time and k not in draft.stated_left}
+    called = {EVENT_COLUMNS.get(name, name): k for name, k in others.items()}
+    places = [called[name] for name in ("taxel", "p", "is_negative") if name in called]
+    if "taxel" not in called or not len(places) == len(others) == 2:
+        return []
+    is_number = all(draft.fit.types[k] == "number" for k in places)
+    return places if is_number and _are_places(draft.fit, [places[0], *places]) else []
 
 
 def _are_places(fit: Fit, columns: Sequence[int], polarities: int = 1) -> bool:

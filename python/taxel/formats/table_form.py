@@ -32,6 +32,7 @@ from taxel.formats.table_columns import (
     by_values,
     find_taxels,
     said_of,
+    say_contradictions,
     time_of,
 )
 from taxel.formats.times import FEW_ODD, ODD, unit_of_times
@@ -126,6 +127,7 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
     are = are_events(draft, time)
     if not are and draft.table.taxel_column is None:
         by_values(draft, time, text)
+        say_contradictions(draft, text)
     if not draft.is_stated("leave_out", "keep"):
         left = (k for k, role in enumerate(draft.roles) if role.is_left and role.certainty != SURE)
         of_taxel = places_of(draft.names, "", draft.table.taxel_column) if draft.table.taxel_column else ()

@@ -8,6 +8,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -33,29 +34,22 @@ _DAYS = {25_569: (3e4, 6.6e4), 719_529: (7.2e5, 7.7e5)}
 #: The unit of times that are texts: dates with times, or times of a day.
 ISO = "iso"
 
-_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+|:\d{3})?|[.,]\d+)?"
-#: The date with hyphens, or with slashes and the year first; with points; with an English month, as MATLAB has it.
-_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-_DATE = (
-    r"(?:\d{4}-\d\d-\d\d|\d{4}/\d{1,2}/\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4}"
-    rf"|\d{{1,2}}-(?:{'|'.join(_MONTHS)})-\d{{4}})"
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+#: The year first; the day first, with points (DIN 5008), or with an English month as MATLAB has it.
+DATE = (
+    r"\d{4}-\d\d-\d\d|\d{4}/\d{1,2}/\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4}"
+    rf"|\d{{1,2}}-(?i:{'|'.join(_MONTHS)})-\d{{4}}"
 )
-#: The half of the day of a clock of twelve hours, and the day with slashes before it, which is month, day and year.
-_HALF, _ENDS = r" ?([AP])\.?M\.?", ("M", "m", ".")
-_HALF_DAY = re.compile(
-    rf"(?:(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}),? +|({_DATE}[T ]))?({_CLOCK}){_HALF}", re.ASCII | re.IGNORECASE
+#: A date, with slashes and the month first only before a clock of twelve hours, and a clock; either alone too.
+_WHEN = re.compile(
+    rf"(?:(?:({DATE})|(\d{{1,2}}/\d{{1,2}}/\d{{4}})(?=.*[AP]\.?M\.?$),?)(?:$|T| +))?"
+    r"(?:(\d{1,2}):(\d\d)(?::(\d\d))?(?:(?:[.,]|(?<=:\d\d:\d\d):(?=\d{3}(?!\d)))(\d+))?"
+    r"(?: ?([AP])\.?M\.?|(Z|[+-]\d\d:?\d\d))?)?",
+    re.ASCII | re.IGNORECASE,
 )
-_IS_TIME = re.compile(rf"(?:{_DATE}[T ])?{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
-_IS_DAY = re.compile(_DATE)
+_SIX_DIGITS = re.compile(r"\d{6}(?:[.,+Z-].*)?", re.ASCII)
 _DAY_US = 86_400_000_000
-_DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\S+))?", re.ASCII)
-_YEAR_FIRST = re.compile(r"(\d{4})/(\d{1,2})/(\d{1,2})(?=[T ]|$)", re.ASCII)
-_MONTH_BY_NAME = re.compile(rf"(\d{{1,2}})-({'|'.join(_MONTHS)})-(\d{{4}})(?=[T ]|$)", re.ASCII)
-_TWO_NUMBERS = re.compile(r"\d{1,2}:\d\d", re.ASCII)
-_TIME_OF_DAY = re.compile(r"\d?\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
-#: Minutes and seconds with a fraction, and hours to seconds with milliseconds behind a colon.
-_MINUTES, _COLON_MS = re.compile(r"(?=\d?\d:\d\d[.,])"), re.compile(r"(?<=:\d\d:\d\d):(?=\d{3})")
-#: Characters of a date without separators.
+#: Characters of a date: 1.5.2024. Most cells are shorter, and to look takes long.
 _SHORTEST_DATE = 8
 #: A counter of times that is full begins at 0 again: its values, in the unit of the file.
 _WRAPS = (1 << 16, 1 << 32)
@@ -75,19 +69,12 @@ def is_time(cell: str) -> bool:
     >>> is_time("2024-05-01T10:00:00.25"), is_time("01.05.2024 10:00:00,25"), is_time("10:00:00"), is_time("10.5")
     (True, True, True, False)
     """
-    if ":" not in cell:
-        return False
-    return _IS_TIME.fullmatch(cell) is not None or (cell[-1:] in _ENDS and _HALF_DAY.fullmatch(cell) is not None)
-
-
-def is_of_two_numbers(cell: str) -> bool:
-    """Return whether a time is of hours and minutes, or as well of minutes and seconds."""
-    return _TWO_NUMBERS.fullmatch(cell) is not None
+    return ":" in cell and _WHEN.fullmatch(cell) is not None
 
 
 def is_day(cell: str) -> bool:
     """Return whether a text is a date without a time."""
-    return len(cell) >= _SHORTEST_DATE and _IS_DAY.fullmatch(cell) is not None
+    return len(cell) >= _SHORTEST_DATE and ":" not in cell and _WHEN.fullmatch(cell) is not None
 
 
 def seconds_of(cell: str) -> float:
@@ -108,34 +95,34 @@ def seconds_of(cell: str) -> float:
     >>> seconds_of("1970/1/2 00:00:00.5"), seconds_of("02-Jan-1970 00:00:01")
     (86400.5, 86401.0)
     """
-    if cell[-1:] in _ENDS and (half := _HALF_DAY.fullmatch(cell)):
-        month, day, year, other, clock, of_day = half.groups()
-        date = f"{day}.{month}.{year} " if month else other or ""
-        hour = clock.partition(":")[0]
-        return seconds_of(f"{date}{clock}") + 43_200 * ((of_day in "pP") - (hour == "12"))
-    if cell[4:5] == "/":
-        cell = _YEAR_FIRST.sub(r"\3.\2.\1", cell)
-    elif "-" in cell[1:3]:
-        cell = _MONTH_BY_NAME.sub(lambda day: f"{day[1]}.{_MONTHS.index(day[2]) + 1}.{day[3]}", cell)
-    colon = cell.find(":")
-    if colon == 1 or (colon > 1 and not cell[colon - 2].isdigit()):
-        cell = f"{cell[: colon - 1]}0{cell[colon - 1 :]}"
-    cell = _COLON_MS.sub(".", cell)
-    if _MINUTES.match(cell):
-        cell = f"00:{cell}"
-    found = _DAY_WITH_POINTS.fullmatch(cell)
-    if found is not None:
-        day, month, year, rest = found.groups()
-        cell = f"{year}-{month:0>2}-{day:0>2}T{rest or '00:00'}"
-    elif _TIME_OF_DAY.fullmatch(cell):
-        cell = f"1970-01-01T{cell}"
-    elif not cell[:4].isdecimal() or len(cell) < _SHORTEST_DATE:
-        return math.nan
     try:
-        at = datetime.fromisoformat(cell)
+        # What is of ISO 8601 is read soonest so; six digits are a time of a day.
+        if cell[4:5] == cell[7:8] == "-" or not (found := _WHEN.fullmatch(cell)) or not cell:
+            at = datetime.fromisoformat(f"1970-01-01T{cell}" if _SIX_DIGITS.fullmatch(cell) else cell)
+            return at.replace(tzinfo=at.tzinfo or UTC).timestamp()
+        day, by_month, *clock, fraction, half, zone = found.groups()
+        midnight = _midnight((day or by_month).lower(), by_month is not None) if day or by_month else 0.0
     except ValueError:
         return math.nan
-    return (at if at.tzinfo is not None else at.replace(tzinfo=UTC)).timestamp()
+    # Two numbers before a fraction are minutes and seconds.
+    clock = [None, *clock[:2]] if fraction and not clock[2] else clock
+    hour, minute, second = (int(part or 0) for part in clock)
+    if half:
+        hour = hour % 12 + 12 * (half in "Pp")
+    if hour > 23 or minute > 59 or second > 59:
+        return math.nan
+    ahead = int(f"{zone[0]}1") * (3600 * int(zone[1:3]) + 60 * int(zone[-2:])) if zone and zone not in "Zz" else 0
+    return midnight + 3600 * hour + 60 * minute + second + (float(f".{fraction:.6}") if fraction else 0.0) - ahead
+
+
+@lru_cache(1000)
+def _midnight(date: str, by_month: bool) -> float:
+    """Return the seconds since 1970 at the begin of a day, of few in a file."""
+    first, second, third = re.split("[-/.]", date)
+    year, month, day = (first, second, third) if len(first) > len(third) else (third, second, first)
+    month, day = (day, month) if by_month else (month, day)
+    of_year = _MONTHS.index(month) + 1 if month in _MONTHS else int(month)
+    return datetime(int(year), of_year, int(day), tzinfo=UTC).timestamp()
 
 
 def epoch_of(numbers: NDArray[np.float64]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from taxel._base.errors import damaged, unreadable
 from taxel._base.messages import counted, first_line, installing
 from taxel.array import Array
 from taxel.formats.layout import Layout
+from taxel.formats.roles import FIRST, Role
 from taxel.formats.times import repaired
 from taxel.frames import Frames
 from taxel.labels import Note, source_of
@@ -81,6 +83,10 @@ def _reader(path: Path, name: str, stream: dict[str, Any], notes: tuple[Note, ..
     frames = Frames(frozen_whole(values[:, None]), frozen_whole(found.t), unit=unit or "as sent", array=array)
     remarks = tuple(f"{counted(len(t), 'time')}: {said}" for said in found.said)
     facts = Facts(path=path, array=array, kind="xdf", label=source_of(name), source=name, remarks=remarks)
+    first = [[f"{value:g}" for value in column] for column in values[:FIRST].T.tolist()]
+    own = names if is_named else [f"channel {k + 1}" for k in range(len(first))]
+    roles = [Role(own[k], column, unit=unit, source=name) for k, column in enumerate(first)]
+    facts = replace(facts, roles=tuple(map(asdict, [Role("time_stamps", role="time"), *roles])))
     return InMemory(facts, frames, Marks(notes=notes))
 
 

@@ -9,9 +9,12 @@ from taxel._base.arguments import number
 from taxel._base.errors import refused
 from taxel._base.limits import TIME_US
 from taxel._core import ProblemError
+from taxel.frames import Frames
 
 #: The default rate of frames of a recording of events, Hz.
 FRAMES_HZ = 100.0
+#: So many frames show whether values repeat, and so many changes among them.
+_LOOKS, _CHANGES = 10_000, 20
 
 
 def period_us(name: str, rate_hz: float) -> int:
@@ -44,3 +47,21 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
         )
     t: NDArray[np.int64] = np.rint(us).astype(np.int64)
     return t
+
+
+def value_us(frames: Frames) -> float:
+    """Return how far apart frames with new values are, us: the median, or more where values are held and repeat.
+
+    They are held where no two frames in a row have new values, and these differ by more than the least step, as a slow
+    change alone does not.
+    """
+    values = frames.values[:_LOOKS].reshape(-1, frames.array.rows * frames.array.columns)
+    step = float(np.median(np.diff(frames.t))) if len(frames) > 1 else 0.0
+    steps = np.nan_to_num(np.abs(np.diff(values, axis=0)))
+    at = np.flatnonzero((steps > 0).any(axis=1))
+    apart = np.diff(at)
+    if len(apart) < _CHANGES or np.quantile(apart, 0.05) < 2:
+        return step
+    moved = steps[at].max(axis=1)
+    usual = apart[apart <= 1.5 * np.quantile(apart, 0.25)]
+    return step * float(usual.mean()) if np.median(moved) > 2 * moved.min() else step

@@ -20,7 +20,7 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import emed, event_camera, moticon, pedar, tekscan, xdf
+from taxel.formats import emed, event_camera, insoles, lerobot, neutouch, tekscan, xdf
 from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
@@ -41,8 +41,6 @@ from taxel.recording.stated import check_size
 
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
 GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
-#: Files of makers and of recorders, and what reads them.
-MAKERS = {"moticon": moticon, "pedar": pedar, "emed": emed, "tekscan": tekscan, "xdf": xdf}
 #: Kinds of files of other programs, which a layout may describe.
 FOREIGN = ("table", "arrays")
 #: The endings of those that may be tables of labels.
@@ -82,7 +80,7 @@ class OpenOptions:
         flag("differences", self.differences)
         if kind != "ros" and not self.topic is self.field is self.ros is None:
             raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
-        if self.label_column is not None and kind != "table":
+        if self.label_column is not None and kind not in ("table", "lerobot"):
             raise refused("label_column", f" is {shown(self.label_column)}: is only for tables; {path} is none")
 
 
@@ -102,6 +100,15 @@ class Kind:
 
     knows: Callable[[Path], bool]
     read: Callable[[Path, Layout | None], Sequence[Reader]]
+
+
+_MODULES = {"emed": emed, "tekscan": tekscan, "xdf": xdf, "neutouch": neutouch, "lerobot": lerobot}
+#: Files of makers and of recorders.
+MAKERS = {
+    "moticon": Kind(insoles.is_moticon, insoles.read_moticon),
+    "pedar": Kind(insoles.is_pedar, insoles.read_pedar),
+    **{name: Kind(module.knows, module.read) for name, module in _MODULES.items()},
+}
 
 
 def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
@@ -150,7 +157,8 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     }.items()
     yield from _from_elsewhere().items()
     yield from {
-        **{name: Kind(maker.knows, maker.read) for name, maker in MAKERS.items()},
+        **MAKERS,
+        "lerobot": Kind(lerobot.knows, lambda path, layout: lerobot.read(path, layout, how.label_column)),
         "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
         "table": Kind(_is_table, read_rows),
@@ -271,8 +279,8 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder, and no ROS bag."""
-    return path.is_dir() and not is_bag(path)
+    """Return whether a path is a folder, and no ROS bag and no data set."""
+    return path.is_dir() and not is_bag(path) and not lerobot.knows(path)
 
 
 def layout_of(path: Path, layout: GivenLayout) -> Layout | None:
@@ -312,7 +320,7 @@ def recordings_in(folder: Path, layout: GivenLayout = None) -> list[Path]:
 def _kind_in_folder(file: Path) -> str | None:
     """Return the format of something in a folder; None of what cannot be read, and of folders that are no ROS bags."""
     try:
-        return kind_of(file) if file.is_file() or is_bag(file) else None
+        return None if is_folder(file) else kind_of(file)
     except OSError:
         # Opening it raises the error.
         return ENDINGS.get(file.suffix.lower())

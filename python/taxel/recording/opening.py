@@ -75,7 +75,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         or "off" events, or "both".
     label_column : str or int, optional
         For a table: the column, by its name or number from 1, whose value becomes a label where it changes; it is no
-        taxel.
+        taxel. For a LeRobot data set: a feature, or "task".
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
@@ -133,7 +133,8 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     Parameters
     ----------
     path : path
-        A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as for `taxel.open`.
+        A folder of recordings of taxel, of ROS bags, or of files of another format; a LeRobot data set; or a file, as
+        for `taxel.open`.
     array, layout, topic, field, ros
         As in `taxel.open`.
     region, bin, count_ms, polarity, label_column : str, int, float (ms), str and str or int, optional

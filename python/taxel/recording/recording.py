@@ -473,10 +473,6 @@ class Recording:
         >>> one.verdict, one.remarks
         ('losses unknown: the .npz does not record them', ('converted from one.npz',))
         """
-        return self._remarks()
-
-    def _remarks(self) -> tuple[str, ...]:
-        """Return the remarks of all sources, each with its source's name if they differ."""
         each = {name: source.facts.remarks for name, source in self._sources.items()}
         if not self.is_several or len(set(each.values())) == 1:
             return self._main.facts.remarks

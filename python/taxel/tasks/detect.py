@@ -26,6 +26,7 @@ from taxel.detect.readout import rest_for, run
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
+from taxel.formats.lerobot import episode_of
 from taxel.options import DetectOptions
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
@@ -123,6 +124,27 @@ class Detecting:
     def outcomes(self) -> list[Outcome]:
         """The outcome of each recording, as a report takes them."""
         return [detected.outcome for detected in self.each]
+
+    def by_frame(self) -> Any:
+        """Return a DataFrame of the detections in a data set of LeRobot, which joins with its tables; None in others.
+
+        Its columns are ``episode_index``, ``frame_index`` (of the last frame not after ``known_s``), ``label``, ``t_s``
+        and ``known_s``, and ``source`` where an episode has several.
+        """
+        if not all(each.recording.kind == "lerobot" for each in self.each):
+            return None
+        import pandas as pd  # noqa: PLC0415  takes long
+
+        tables = []
+        for each in self.each:
+            recording, found = each.recording, each.outcome.found
+            last = np.searchsorted(recording.frames().t, found.known, side="right") - 1
+            of = {"episode_index": episode_of(recording.name), "source": recording.label, "frame_index": last}
+            tables.append(
+                pd.DataFrame({**of, "label": found.label, "t_s": found.t / 1e6, "known_s": found.known / 1e6})
+            )
+        table = pd.concat(tables, ignore_index=True)
+        return table if len({each.recording.label for each in self.each}) > 1 else table.drop(columns="source")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the detections and scores as plain values for JSON."""

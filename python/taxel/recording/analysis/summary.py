@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from taxel.clock import doubt
 from taxel.events import Events
+from taxel.formats.layout import layout_name
 from taxel.frames import Frames
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series
+from taxel.recording.frames import value_us
 from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
@@ -20,6 +22,8 @@ _PEAK_US = 10_000
 _PLACES = 100
 #: Kinds of files that do not state the sensor of their events.
 _WITHOUT_SIZE = ("csv", "lsa", "records", "table")
+#: Kinds of files whose times may be those at which a host asked.
+_OF_HOSTS = ("records", "table", "neutouch")
 
 
 def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
@@ -52,6 +56,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         events = table
         facts["events"] = len(events)
         facts["intensities"] = 0 if events.present is None else int(events.present.sum())
+        facts["bursts_us"] = _bursts_us(events.t) if recording.kind in _OF_HOSTS else None
         facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
         if events.intensity is None and _may_be_of_camera(recording):
@@ -60,6 +65,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     else:
         facts["frames"], facts["unit"] = len(table), table.unit
         facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
+        facts["values_per_s"] = 1e6 / value_us(table) if seconds else None
         facts["missing"] = {"values": table.missing, "of": table.values.size}
     gaps = recording._gaps
     facts["gaps"] = None if gaps is None else gaps.to_dict()
@@ -100,8 +106,20 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
         "layout": stated,
+        "layout_file": layout_name(recording.path),
         "roles": list(recording._main.facts.roles),
     }
+
+
+def _bursts_us(t: NDArray[np.int64]) -> float | None:
+    """Return how far apart bursts of events are, us, if between most of them nearly all time passes; else None."""
+    steps = np.diff(t)
+    wide = steps[steps > 10 * max(1.0, float(np.median(steps)))] if len(steps) else steps
+    if len(wide) < 20:
+        return None
+    usual = float(np.median(wide))
+    near = wide[np.abs(wide - usual) < 0.25 * usual]
+    return usual if near.sum() > 0.5 * steps[steps < 4 * usual].sum() else None
 
 
 def _may_be_of_camera(recording: Recording) -> bool:

@@ -62,7 +62,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     lost = rows.odd.said()
     try:
         if tuple(names[:4]) == EVENTS:
-            table: Events | Frames = events_of(path, form, names[1:], rows, array, ascending=False)
+            table: Events | Frames = events_of(path, form, names[1:], rows, array)
         else:
             table = _frames(path, names[1:], rows, array, lost)
     except ProblemError as error:
