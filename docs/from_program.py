@@ -149,7 +149,8 @@ def study(section: dict[str, Any]) -> list[str]:
     for picture in section["pictures"]:
         lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
     rows = [[str(j["claim"]), j["reading"], VERDICTS[j["holds"]], j["ours"], j["why"]] for j in section["judgements"]]
-    lines += table(["claim", "reading", "", "ours", "why"], rows, "6 24 10 35 25")
+    if rows:
+        lines += table(["claim", "reading", "", "ours", "why"], rows, "6 24 10 35 25")
     if (fits := section.get("fits", {})).get("open"):
         lines += [
             "",
