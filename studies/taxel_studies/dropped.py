@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import pdist, squareform
 
 from taxel import SceneError
 from taxel.array import Array
@@ -348,22 +349,29 @@ def spatial_grams(
     return grams
 
 
-def summed_over_trains(
+def as_printed(
     spikes: NDArray[np.uint8], period_ms: float, tau: float, kernel: NDArray[np.float32]
-) -> NDArray[np.float64]:
-    """Return the distances of all patterns as 5.12 prints them: Euclidean norms over time, summed over trains.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the distances of all patterns as 5.12 and 5.10 print them: norms summed over trains, all over time too.
 
+    The first is Euclidean over time; the root of 5.10 is of one square, so the second adds up what is apart, ms.
     Parameters are those of `spatial_grams`, with one kernel.
     """
     count, samples, layers, taxels = spikes.shape
     state = np.zeros((count, layers, taxels), np.float32)
     smooth = np.empty((layers * taxels, count, samples), np.float32)
+    over_time = np.zeros(count * (count - 1) // 2)
     for k in range(samples):
         state = state * np.float32(np.exp(-period_ms / tau)) + spikes[:, k]
-        smooth[:, :, k] = (state.reshape(-1, taxels) @ kernel).reshape(count, -1).T
+        here = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+        smooth[:, :, k] = here.T
+        # All trains fall alike until the next sample; after the last for good.
+        until = -np.expm1(-period_ms / tau) if k + 1 < samples else 1.0
+        over_time += tau * until * pdist(here, "cityblock")
     # As in `spatial_grams`: each sample but the last counts until the next one.
     smooth[:, :, :-1] *= np.float32(np.sqrt(-np.expm1(-2 * period_ms / tau)))
-    return np.asarray(sum(distances_of((one @ one.T).astype(np.float64)) for one in smooth))
+    norms = np.asarray(sum(distances_of((one @ one.T).astype(np.float64)) for one in smooth))
+    return norms, squareform(over_time)
 
 
 def distances_of(gram: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -87,9 +87,23 @@ def test_norms_summed_over_trains_are_those_of_one_train_each():
         )
         for n in range(SIDE**2)
     ]
-    found = dropped.summed_over_trains(spikes, PERIOD_MS, 0.4, kernel)
+    found, _ = dropped.as_printed(spikes, PERIOD_MS, 0.4, kernel)
     # Inner products there are in ms; the factor tau / 2 is left out here.
     np.testing.assert_allclose(found, np.sum(one_by_one, axis=0) / np.sqrt(0.2), atol=1e-2 * found.max())
+
+
+def test_a_sum_over_time_is_the_integral_of_what_is_apart():
+    spikes, _ = patterns(layers=1)
+    kernel, step = dropped.smoothed(SIDE, 2.67, 2.0), PERIOD_MS / 200
+    trains = np.zeros((len(spikes), spikes.shape[1] * 200 + 2000, SIDE**2))
+    trains[:, : spikes.shape[1] * 200 : 200] = spikes[:, :, 0]
+    decay = np.exp(-step / 0.4)
+    for k in range(1, trains.shape[1]):
+        trains[:, k] += decay * trains[:, k - 1]
+    smooth = trains @ kernel
+    apart = [[step * np.abs(a - b).sum() for b in smooth[:5]] for a in smooth[:5]]
+    _, found = dropped.as_printed(spikes, PERIOD_MS, 0.4, kernel)
+    np.testing.assert_allclose(found[:5, :5], apart, rtol=0.02)
 
 
 def test_search_first_then_a_look_at_the_best_pair_of_all_periods_and_of_each(tmp_path):
