@@ -143,6 +143,23 @@ def span(page: Any) -> list[float]:
     return [first - left * per, first + (100 - left) * per]
 
 
+#: The columns of a lane's canvas that are mostly of the colour of the grid, as shares of the width of the axis.
+GRID = """name => {
+  const canvas = document.querySelector(`#${name}-lane canvas`), {width, height} = canvas;
+  const {data} = canvas.getContext("2d").getImageData(0, 0, width, height);
+  const colour = getComputedStyle(document.documentElement).getPropertyValue("--grid");
+  const grid = colour.match(/[0-9a-f]{2}/g).map(h => parseInt(h, 16));
+  const is = at => data[at + 3] > 99 && grid.every((of, k) => Math.abs(data[at + k] - of) < 12);
+  const rows = x => Array.from({length: height}, (_, y) => is(4 * (y * width + x))).filter(Boolean).length;
+  const lines = Array.from({length: width}, (_, x) => x).filter(x => rows(x) > height / 2);
+  const axis = document.getElementById("axis").getBoundingClientRect(), box = canvas.getBoundingClientRect();
+  return lines.map(x => 100 * (box.x + (x + .5) * box.width / width - axis.x) / axis.width);
+}"""
+
+#: Where the axis has numbers, %.
+NUMBERS = "() => [...document.querySelectorAll('#axis span')].map(e => parseFloat(e.style.left))"
+
+
 def pixel(page: Any, t_s: float) -> float:
     """Return where a time is on the screen."""
     box, (start, stop) = page.locator("#track").bounding_box(), span(page)

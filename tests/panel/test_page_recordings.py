@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.panel.pages import (
+    GRID,
+    NUMBERS,
     clock,
     pixel,
     press,
@@ -106,6 +108,15 @@ def test_the_lanes_zoom_and_scroll(replay: Any) -> None:
     replay.mouse.up()
     until(lambda: span(replay)[0] == pytest.approx(start - (stop - start) / 4, abs=0.01), "a drag scrolls")
     assert clock(replay) == pytest.approx(5.2, abs=0.003), "and shows no other time"
+    # While it is dragged too, the lines of the grid are at the numbers below.
+    replay.mouse.down()
+    for step in range(1, 5):
+        replay.mouse.move(middle + box["width"] / 4 - 37 * step, box["y"] + 5)
+        replay.wait_for_timeout(60)
+        lines, numbers = replay.evaluate(GRID, "force"), replay.evaluate(NUMBERS)
+        assert len(numbers) > 1
+        assert all(min(abs(line - number) for line in lines) < 0.4 for number in numbers), (lines, numbers)
+    replay.mouse.up()
     press(replay, "Home")
     until(lambda: span(replay)[0] < 0.2 < span(replay)[1], "the window follows the time")
     replay.locator("#zoom-all").click()

@@ -41,8 +41,6 @@ import { rounded, integer } from "./words.js";
 /** Room for the numbers on the left, and for half a number of the axis of time on the right, CSS pixels; as in style.css. */
 const SIDE = 44;
 const RIGHT = 14;
-/** CSS pixels between two lines of the grid. */
-const GRID_PX = 96;
 /** Steps between the numbers of an axis of counts. */
 const WHOLE = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000];
 /** Up to this many channels have a curve each, and so many a name of so many letters beside it. */
@@ -156,21 +154,18 @@ export const LANES = [
   },
   {
     name: "taxel", label: "History of the watched taxel",
-    heading: () => ["Taxel ", make("span", {}, "least to greatest, last"), " ", output()],
+    heading: () => ["Taxel ", make("span", {}, "least to greatest"), " ", output()],
     says: ({ values: { unit, step, zero } }, { taxel }) => (taxel === null ? [] : [`${rounded((taxel - zero) * step)} ${unit}`]),
     plan: (shown) => {
-      /** @type {uPlot.Series} the edge of a band */
-      const bound = { scale: "value", points: { show: false } };
       const room = () => 2 * shown().values.step;
       return {
         scales: { value: { range: (_, least, greatest) => (least === null ? [0, 10] : [least - room(), greatest + room()]) } },
-        series: [bound, bound, line(themed("more"), "value")],
-        bands: [{ series: [2, 1], fill: themed("band") }],
+        ...extents([themed("more")], "value"),
         axes: [axis("value", themed("dim"))],
       };
     },
     at: ({ values: { step, zero } }, { history }, column) =>
-      history[3 * column + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * column, 3 * column + 3), (ticks) => (ticks - zero) * step),
+      history[3 * column + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * column, 3 * column + 2), (ticks) => (ticks - zero) * step),
   },
   {
     name: "force", label: "Sum of the values, or force",
@@ -320,14 +315,14 @@ export class Lanes {
     }
   }
 
-  /** @param {Timeline} timeline */
-  draw(timeline) {
+  /** @param {Timeline} timeline @param {import("./timeline.js").Tick[]} ticks of its axis */
+  draw(timeline, ticks) {
     const { columns, window, column_us } = timeline;
     const shown = this.shown();
     this.sources = shown.sensor.sources.slice(0, timeline.source_count).map(({ name }) => name);
     this.renew();
     this.span_s = timeline.span_us / 1e6;
-    this.splits = timeline.ticks(part("lanes", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
+    this.splits = ticks.map(({ share }) => share * this.span_s);
     const gaps = shown.gap_us !== null && columns ? timeline.gaps(columns[0] - 1, columns[1], shown.gap_us) : new Set();
     for (const { lane, block, painter, plot } of this.all) {
       if (block.hidden) continue;
@@ -343,6 +338,8 @@ export class Lanes {
         curves.forEach((curve, k) => curve.push(values[k] ?? null));
       }
       plot.setData([numbers.map((number) => ((number + 0.5) * column_us - window[0]) / 1e6), ...curves]);
+      // The grid moves with the window, also where no scale has changed.
+      plot.redraw(false, true);
     }
   }
 

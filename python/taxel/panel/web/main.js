@@ -438,7 +438,12 @@ function drawFrame(now_ms) {
   if ((lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
     lanesAt = now_ms;
     if (lanesDue) {
-      if (timeline) lanes.draw(timeline);
+      if (timeline) {
+        // Grid and numbers are of one picture.
+        const ticks = timeWindow.ticks(timeline);
+        lanes.draw(timeline, ticks);
+        timeWindow.writeAxis(ticks);
+      }
       labels.arrange();
       mark();
     } else cursor.draw();

@@ -169,16 +169,24 @@ export class TimeWindow {
     this.asking = false;
   }
 
-  /** Writes the axis and the length of the window. */
-  write() {
-    const timeline = this.timeline();
-    if (!timeline) return;
-    const ticks = timeline.ticks(this.axis.clientWidth / TICK_PX);
+  /** Writes the axis. @param {import("./timeline.js").Tick[]} ticks */
+  writeAxis(ticks) {
     const marks = withChildren(this.axis, ticks.length, () => make("span"));
     ticks.forEach(({ share, text }, i) => {
       write(marks[i], text);
       marks[i].style.left = `${(100 * share).toFixed(2)}%`;
     });
+  }
+
+  /** @param {import("./timeline.js").Timeline} timeline @returns {import("./timeline.js").Tick[]} the numbers of the axis, as many as have room */
+  ticks(timeline) {
+    return timeline.ticks(this.axis.clientWidth / TICK_PX);
+  }
+
+  /** Writes the length of the window. */
+  write() {
+    const timeline = this.timeline();
+    if (!timeline) return;
     write(part("span", HTMLElement), short(timeline.span_us));
     const [, most] = this.limits() ?? [0, timeline.column_us];
     part("zoom-in", HTMLButtonElement).disabled = timeline.span_us <= SHORTEST_US;
