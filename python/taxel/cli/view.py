@@ -18,6 +18,7 @@ from taxel.cli._say import say
 from taxel.cli._topics import list_topics
 from taxel.cli.app import App, Flat, JsonOption, SecondsOption
 from taxel.cli.console import Console
+from taxel.formats.roles import OpenRolesError
 from taxel.formats.ros import is_bag, topics
 from taxel.options import FullReading
 from taxel.panel import Panel
@@ -94,6 +95,9 @@ def _opening(
             return opened
         return [sensor._calibrated_by(calibration) for sensor in opened]
 
-    # The panel asks first for the recording that was opened here, so that errors are those of the command.
-    opened = {first.absolute(): opens(first)}
+    # The panel asks first for the recording that was opened here, so that errors are those of the command; the page
+    # asks for roles that are open.
+    opened: dict[Path, list[Recording]] = {}
+    with contextlib.suppress(OpenRolesError):
+        opened[first.absolute()] = opens(first)
     return lambda file: opened.pop(file.absolute(), None) or opens(file)

@@ -150,7 +150,7 @@ def look_at(path: Path, layout: Layout, group: Group) -> tuple[Data, list[str], 
         raise unreadable(
             f"contains no numbers; must hold an array of numbers{struct * (path.suffix.lower() == '.mat')}", path
         )
-    how = _named(path, layout.data or Data(), stored)
+    how = _named(path, layout, stored)
     full, said, roles, questions = _axes(path, layout, how, group)
     questions = [question for question in questions if not question.keys & layout.stated]
     refuse_open(path, f"contains {_list(stored)}, which can be read in", full, roles, questions)
@@ -169,9 +169,9 @@ def _list(stored: Mapping[str, tuple[int, ...]]) -> str:
     return (", ".join(names) or "no numbers") + ", ..." * (len(stored) > 8)
 
 
-def _named(path: Path, how: Data, stored: Mapping[str, tuple[int, ...]]) -> Data:
-    """Return the names of the array of frames and of that of times, which are there."""
-    is_npy = path.suffix.lower() == ".npy"
+def _named(path: Path, layout: Layout, stored: Mapping[str, tuple[int, ...]]) -> Data:
+    """Return the names of the array of frames and of that of times, which are there; ask which it is of several."""
+    how, is_npy = layout.data or Data(), path.suffix.lower() == ".npy"
     for key in ("array", "time"):
         name = getattr(how, key)
         if not isinstance(name, str):
@@ -187,8 +187,20 @@ def _named(path: Path, how: Data, stored: Mapping[str, tuple[int, ...]]) -> Data
     several = {name: shape for name, shape in stored.items() if math.prod(shape) > 1 and time_unit(name) is None}
     grids = [name for name, shape in several.items() if len(shape) >= 2 and math.prod(shape) > max(shape)]
     frames = grids or list(several)
-    if len(frames) != 1:
+    if not frames:
         raise unreadable(f"contains {_list(stored)}; {advice(path, 'name the array of frames')}: [data] array", path)
+    if len(frames) > 1:
+        is_time = {name: "no taxel" if time_unit(name) is None else "time" for name in stored}
+        roles = [
+            Role(name, [_size(shape)], is_time[name], "named so" * (is_time[name] == "time"))
+            if name not in frames
+            else Role(name, [_size(shape)], certainty=OPEN)
+            for name, shape in stored.items()
+        ]
+        choices: dict[str, Changes] = {name: {"array": name} for name in frames}
+        question = Question("which array holds the frames", frozenset({"array"}), choices)
+        full = replace(layout, data=replace(how, array=frames[0]))
+        refuse_open(path, f"contains {_list(stored)}, which can be read in", full, roles, [question])
     return replace(how, array=frames[0])
 
 

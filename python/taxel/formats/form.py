@@ -15,6 +15,7 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.formats.layout import Table
+from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, WITH_TEXT, WITH_THOUSANDS, is_number, number_of, read_line
 from taxel.formats.roles import Role
 from taxel.formats.times import ISO, UNITS_US, is_time, seconds_of
@@ -56,6 +57,8 @@ class Form:
         What was understood beyond what is stated of a live source, as its keys.
     roles : sequence of Role
         Of each column.
+    fit : Fit, optional
+        The cells of the lines that show it.
     """
 
     table: Table
@@ -66,6 +69,7 @@ class Form:
     lines: int = 1
     keys: Mapping[str, str] = field(default_factory=dict)
     roles: Sequence[Role] = ()
+    fit: Fit | None = None
 
     def called(self, column: int) -> str:
         """Return the name of a column, or its number if it has none."""

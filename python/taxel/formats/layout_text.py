@@ -8,10 +8,10 @@ from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from taxel._base.errors import unreadable
+from taxel._base.errors import placed
 from taxel.array import Places
 from taxel.formats.layout import Data, Layout, Table, advice
-from taxel.formats.roles import Changes, Question, Role, lines_of
+from taxel.formats.roles import Changes, OpenRolesError, Question, Role, lines_of
 
 _RATE_NOT_SAID = "# rate_hz = 100  # frames per second, which the file does not state"
 
@@ -66,7 +66,7 @@ def refuse_open(path: Path, about: str, layout: Layout, roles: Sequence[Role], q
 
     Raises
     ------
-    FormatError : there is a question (the table and the layouts are below its first line)
+    OpenRolesError : there is a question (the table and the layouts are below its first line)
     """
     if not questions:
         return
@@ -78,17 +78,20 @@ def refuse_open(path: Path, about: str, layout: Layout, roles: Sequence[Role], q
     for number, (name, changes) in enumerate(choices.items(), 1):
         full = without(changed(layout, changes), later)
         times = (getattr(full.table, "time_column", None), getattr(full.table, "frame_time", None))
-        timed = any((*times, full.rate_hz, getattr(full.data, "time", None)))
+        found = any(role.role == "time" for role in roles) and full.data is not None
+        timed = found or any((*times, full.rate_hz, getattr(full.data, "time", None)))
         lines += [f"# {number}. {name}", *([] if timed else [_RATE_NOT_SAID]), of_layout(full)]
     right = advice(path, f"write {'one of these' if len(choices) > 1 else 'this'}")
-    error = unreadable(f"{ways}{also}; {right}:", path)
-    error.args = (*error.args, "\n".join(lines).rstrip())
+    error = placed(OpenRolesError(f"{ways}{also}; {right}:", "\n".join(lines).rstrip()), path)
+    error.layout, error.roles, error.questions = layout, roles, questions
     raise error
 
 
 def changed(layout: Layout, changes: Changes) -> Layout:
     """Return a layout with other keys, of its own, its table or its data, which it states, except those of nothing."""
-    said = {key for key, value in changes.items() if value not in (None, [])} - {"left", "read"}
+    layout = without(layout, frozenset(key for key, value in changes.items() if value is None))
+    changes = {key: value for key, value in changes.items() if value is not None}
+    said = {key for key, value in changes.items() if value != []} - {"left", "read"}
     if layout.table is not None and {"left", "read"} & changes.keys():
         left = [column for column in layout.table.leave_out if column not in changes.get("read", ())]
         more = (column for column in changes.get("left", ()) if column not in left)

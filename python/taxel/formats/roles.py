@@ -9,12 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from taxel._core import FormatError
+
+if TYPE_CHECKING:
+    from taxel.formats.layout import Layout
 
 #: How sure a role is: it cannot be anything else; it is assumed, and said; nothing is read before it is answered.
 SURE, LIKELY, OPEN = "sure", "likely", "open"
-#: What an answer changes in a layout: keys of it or of its table; `left` and `read` are columns more or fewer to leave
-#: out.
+#: What an answer changes in a layout: keys of it or of its table, None for those that it states no more; `left` and
+#: `read` are columns more or fewer to leave out.
 Changes: TypeAlias = Mapping[str, Any]
 #: So many first values of a column are shown.
 FIRST = 3
@@ -65,6 +70,22 @@ class Question:
     why: str
     keys: frozenset[str]
     choices: Mapping[str, Changes] = field(default_factory=dict)
+
+
+class OpenRolesError(FormatError):
+    """A file cannot be read before questions are answered.
+
+    Attributes
+    ----------
+    layout : Layout
+        The rest of how it is read.
+    roles : sequence of Role
+    questions : sequence of Question
+    """
+
+    layout: Layout
+    roles: Sequence[Role]
+    questions: Sequence[Question]
 
 
 def lines_of(roles: Sequence[Role]) -> Iterator[str]:

@@ -141,7 +141,7 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
     refuse_open(text.path, "can be read in", full, draft.roles, draft.questions)
     how = full.table or draft.table
     said = (*said_of(draft, time), *draft.said)
-    return Form(how, draft.names, draft.fit.first, said, _own(how, draft.names), roles=draft.roles), full
+    return Form(how, draft.names, draft.fit.first, said, _own(how, draft.names), roles=draft.roles, fit=draft.fit), full
 
 
 def _draft(text: Text, layout: Layout, lines: Sequence[str]) -> Draft:

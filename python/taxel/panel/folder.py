@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,8 +12,15 @@ from typing import Any
 
 from taxel import _core
 from taxel._base.errors import refused
+from taxel._base.files import write_whole
+from taxel._core import ProblemError
+from taxel.formats.layout import Layout
+from taxel.formats.layout_text import of_layout
+from taxel.formats.roles import Changes
+from taxel.panel.look import Looks, layout_beside
 from taxel.panel.shown_files import FileState, Opening, ShownFiles, state_of
 from taxel.panel.threads import in_thread
+from taxel.recording.kinds import FOREIGN, kind_of
 
 #: Recordings and readouts in a list.
 _MOST_LISTED = 1000
@@ -88,7 +96,7 @@ class Folder:
 
     def __init__(self, path: Path, opening: Opening, asked: str | None, records: Callable[[], bool]) -> None:
         self.path, self._asked = path, asked
-        self.files = ShownFiles(opening, records)
+        self.files, self.looks = ShownFiles(opening, records), Looks()
         self._opening = opening
         self._locks: dict[Path, asyncio.Lock] = {}
         #: The recordings that were opened last, by path and the trial that was asked for.
@@ -120,6 +128,33 @@ class Folder:
                 continue
         files.sort(key=lambda file: -file[2])
         return files[:_MOST_LISTED], sorted(readouts)[:_MOST_LISTED]
+
+    def look(self, name: str, text: str | None, changes: Changes) -> tuple[dict[str, Any], Layout | None]:
+        """Return what a file is by a layout as text, or by its own, that is changed: as `Looks.look`."""
+        path = self.file(name)
+        layout = self._opening.layout_of(path)
+        return self.looks.look(path, layout if text is None else Layout.of_text(layout.path, text), changes)
+
+    def lay(self, name: str, text: str, *, folder: bool, replace: bool) -> None:
+        """Write a layout file beside a recording, or for all recordings of its folder.
+
+        Raises
+        ------
+        FormatError : no layout
+        ProblemError : no file that a layout describes; the layout file is there; another is read instead
+        OSError : it cannot be written
+        """
+        path = self.file(name)
+        out, own = (layout_beside(path, folder=each) for each in (folder, False))
+        if kind_of(path) not in FOREIGN:
+            raise ProblemError(f"{name}: states its sensor itself, so it needs no layout")
+        read = self._opening.options_of(path).layout or (own if folder and own.exists() else None)
+        if read is not None:
+            raise ProblemError(f"{out.name} would not be read, as {name} is read by {Path(read).name}")
+        if os.path.lexists(out) and not replace:
+            raise refused("replace", f": {out.name} exists already")
+        written = of_layout(Layout.of_text(out, text)).encode()
+        write_whole(out, lambda file: file.write(written), overwrite=replace)
 
     async def open(self, name: str, trial: str | None) -> Shown:
         """Return a recording, indexed once however many clients show it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from taxel._base.errors import refused
 from taxel._base.files import named
 from taxel._core import ProblemError
 from taxel.device import Cable
+from taxel.formats.roles import OpenRolesError
 from taxel.live import Live
 from taxel.options import FullReading
 from taxel.panel.hub import Hub
@@ -163,7 +165,9 @@ def _folder_and_name(path: Path, options: FullReading) -> tuple[Path, str]:
         path = files[0]
     if not path.exists():
         raise FileNotFoundError(2, "no such recording", str(path))
-    check_recording(path, layout_for(path, options.layout, options.rate_hz))
+    # The page asks for what is open.
+    with contextlib.suppress(OpenRolesError):
+        check_recording(path, layout_for(path, options.layout, options.rate_hz))
     # A link is a recording of the folder in which it is, as elsewhere: its labels are beside it.
     path = named(path)
     path = path.parent.resolve() / path.name

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator
 
 from taxel import _core
+from taxel.formats.roles import OpenRolesError
 
 
 def reason(error: Exception) -> str:
@@ -21,7 +22,9 @@ def reason(error: Exception) -> str:
 
 
 def field_of(error: Exception) -> str | None:
-    """Return the key or register at fault."""
+    """Return the key or register at fault; "roles" where something of a file is open."""
+    if isinstance(error, OpenRolesError):
+        return "roles"
     return getattr(error, "field", None) or getattr(error, "argument", None)
 
 

@@ -23,6 +23,7 @@ from taxel.live.lines import preview
 from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
 from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
+from taxel.panel.look import picture
 from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
 from taxel.panel.shown_files import judged
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
 #: Frames on their way, labels of a request, long requests at a time, changes of labels that can be undone.
 _MOST_CREDITS, _MOST_LABELS, _MOST_LONG, _MOST_CHANGES = 8, 5000, 8, 1000
+#: Characters of a layout.
+_MOST_LAYOUT = 500_000
 
 #: A client with more refused requests than the first within the second is disconnected, s.
 _MOST_REFUSED, _REFUSED_WITHIN_S = 100, 10.0
@@ -266,6 +269,37 @@ class Session:
         with at_field("name"):
             shown = await self._hub.folder.open(name, trial)
             await self._show(shown)
+
+    @long_request
+    async def look(
+        self,
+        name: Annotated[str, line(110)],
+        text: Annotated[str, Meta(max_length=_MOST_LAYOUT)] | None = None,
+        changes: dict[str, Any] | None = None,
+    ) -> None:
+        """Send `look` and `seen`: what the columns or axes of a file of another program are, and a picture of it.
+
+        By a layout as `text`, as `look` has it, or else by that of the file, with the `changes` that `look` offers.
+        """
+        with at_field("name"):
+            message, whole = await in_thread(self._hub.folder.look, name, text, changes or {})
+        await self.say(message)
+        if whole is not None:
+            await self.say(await in_thread(picture, self._hub.folder.file(name), whole))
+
+    @request
+    async def lay(
+        self,
+        name: Annotated[str, line(110)],
+        text: Annotated[str, Meta(max_length=_MOST_LAYOUT)],
+        folder: bool = False,
+        replace: bool = False,
+    ) -> None:
+        """Write a layout to NAME.layout.toml beside a file of another program, or to layout.toml for its folder.
+
+        Refused at `replace` if that file is there, unless `replace` is true.
+        """
+        await in_thread(self._hub.folder.lay, name, text, folder=folder, replace=replace)
 
     async def _show(self, shown: Shown) -> None:
         trouble = None

@@ -16,7 +16,7 @@ from taxel import _core
 from taxel._base.limits import available
 from taxel._core import UNKNOWN, FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats.layout import Layout
+from taxel.formats.layout import Layout, layout_name
 from taxel.frames import Frames
 from taxel.labels import Labels, beside, by_clock
 from taxel.options import FullReading
@@ -26,7 +26,7 @@ from taxel.recording.analysis.quiet import ticks_by_unit
 from taxel.recording.analysis.rest import loaded_from, of_frames
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.kinds import is_recording
+from taxel.recording.kinds import FOREIGN, is_recording, layout_of
 from taxel.recording.reading_options import layout_for
 from taxel.verdict import Verdict
 from taxel.wire import Registers
@@ -128,6 +128,12 @@ class Opening:
         """Return the options by which a file is opened."""
         return self.options if self.file in (None, file) else FullReading()
 
+    def layout_of(self, file: Path) -> Layout:
+        """Return the layout by which a file is opened; an empty one if it has none."""
+        options = self.options_of(file)
+        given = layout_for(file, options.layout, options.rate_hz)
+        return layout_of(file, given) or Layout(file.with_name(layout_name(file)))
+
     def unit_us(self, table: Path) -> float:
         """Return how many us a unit of time in a table of labels is."""
         rate_hz = self.options.rate_hz
@@ -228,10 +234,11 @@ class ShownFiles:
         if board is not None:
             return board
         recording, names = self.opened(path, trial)
-        if not recording.is_several and recording.has_events:
-            return _events(recording)
-        viewed = _frames(recording)
-        viewed.contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
+        are_events = not recording.is_several and recording.has_events
+        viewed = _events(recording) if are_events else _frames(recording)
+        viewed.contents["has_roles"] = recording.kind in FOREIGN
+        if not are_events:
+            viewed.contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
         return viewed
 
     def judge(self, path: Path, trial: str | None) -> dict[str, Any]:
@@ -345,6 +352,7 @@ def _contents(
         **recording.opened(),
         "verdict": verdict,
         "pace": None,
+        "has_roles": False,
         "registers": None if registers is None else registers._held,
         "frame_us": None if registers is None else registers.frame_us,
         "notes": [{"t_us": None if t is None else t * us, "text": text, "source": source} for t, text, source in notes],
