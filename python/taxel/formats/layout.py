@@ -201,10 +201,10 @@ class Data:
         text("time_unit", self.time_unit, UNITS_US)
         if self.axes is not None:
             named = text("axes", self.axes).split()
-            if len(set(named)) < len(named) or "time" not in named or not set(named) <= set(_AXES_OF_ARRAYS):
-                raise refused(
-                    "axes", f" is {shown(self.axes)}: must be time and others of {', '.join(_AXES_OF_ARRAYS)}"
-                )
+            once = {"column" if name == "taxel" else name for name in named}
+            if len(once) < len(named) or "time" not in named or not set(named) <= set(_AXES_OF_ARRAYS):
+                others = f"time and others of {', '.join(_AXES_OF_ARRAYS)}, taxel without column"
+                raise refused("axes", f" is {shown(self.axes)}: must be {others}")
 
 
 @dataclass(frozen=True)

@@ -132,6 +132,7 @@ class Folder:
     def look(self, name: str, text: str | None, changes: Changes) -> tuple[dict[str, Any], Layout | None]:
         """Return what a file is by a layout as text, or by its own, that is changed: as `Looks.look`."""
         path = self.file(name)
+        self.files.check(path)
         layout = self._opening.layout_of(path)
         return self.looks.look(path, layout if text is None else Layout.of_text(layout.path, text), changes)
 

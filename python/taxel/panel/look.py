@@ -283,7 +283,8 @@ def _of_arrays(found: Found) -> Any:
 
     def counting(k: int, word: str) -> str:
         """Return what axes count if one counts something: it changes with another that does; one is the time."""
-        made = [axes[k] if each == word else each for each in axes]
+        like = ("taxel", "column") if word in ("taxel", "column") else (word,)
+        made = [axes[k] if each in like else each for each in axes]
         made[k] = word
         if "time" not in made:
             made[max((j for j in range(len(made)) if j != k), key=lambda j: sizes[j])] = "time"

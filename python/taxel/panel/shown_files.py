@@ -190,13 +190,12 @@ class ShownFiles:
         #: The trials of the file with several that was read last, by its path and state.
         self._trials: tuple[tuple[Path, FileState], list[Recording]] | None = None
 
-    def opened(self, path: Path, trial: str | None) -> tuple[Recording, list[str]]:
-        """Return a recording of a file, and the names of its trials if it has several.
+    def check(self, path: Path) -> None:
+        """Refuse a file of another program while a recording runs.
 
         Raises
         ------
-        FormatError : no recording
-        ProblemError : no trial of that name; a recording runs, and the file is of another program
+        ProblemError : a recording runs, and the file is of another program
         """
         if path.suffix.lower() not in _OWN and self._records():
             own = " and ".join(_OWN)
@@ -204,6 +203,16 @@ class ShownFiles:
                 f"{path.name}: while a recording runs, the page opens {own} only, as another file may need all memory; "
                 "stop the recording first"
             )
+
+    def opened(self, path: Path, trial: str | None) -> tuple[Recording, list[str]]:
+        """Return a recording of a file, and the names of its trials if it has several.
+
+        Raises
+        ------
+        FormatError : no recording
+        ProblemError : no trial of that name; as of `check`
+        """
+        self.check(path)
         key = path, state_of(path)
         with self._lock:
             known = self._trials

@@ -18,8 +18,9 @@ import { Player } from "./player.js";
 import { readFrame } from "./protocol.js";
 import { Pointed } from "./pointed.js";
 import { Recorder } from "./recorder.js";
+import { Roles } from "./roles.js";
 import { Sensor } from "./sensor.js";
-import { Server } from "./server.js";
+import { RefusedError, Server } from "./server.js";
 import { Settings } from "./settings.js";
 import { showState } from "./state.js";
 import { Strip } from "./strip.js";
@@ -68,6 +69,8 @@ divide(settings);
 new ResizeObserver(() => (lanesDue = true)).observe(part("lanes", HTMLElement));
 const board = new Board(server, failed);
 const sensor = new Sensor(server);
+const roles = new Roles(server, (name) => ask(name));
+part("roles-button", HTMLButtonElement).onclick = () => opened && roles.open(opened.name);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
@@ -256,6 +259,10 @@ function receive(message) {
       return sensor.offer(message);
     case "guess":
       return sensor.take(message);
+    case "look":
+      return roles.take(message);
+    case "seen":
+      return roles.see(message);
     case "cut":
       return notify(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
     case "warning":
@@ -323,11 +330,13 @@ async function ask(name, trial) {
     await server.request({ type: "open", name, ...(trial === undefined ? {} : { trial }) });
   } catch (error) {
     const why = error instanceof Error ? error.message : String(error);
-    refused = why.includes(name) ? why : `${name}: ${why}`;
+    // Below the first line are layouts to copy, which the dialog of roles has as menus.
+    [refused] = (why.includes(name) ? why : `${name}: ${why}`).split("\n");
     // What is open stays open, so that the same file can be chosen again once it is mended.
     if (opening === name) part("files", HTMLSelectElement).value = opened?.name ?? "";
+    if (error instanceof RefusedError && error.field === "roles") roles.open(name);
     // Where nothing is shown it stands above the maps.
-    if (player.transport.source !== null || hello?.live) notify(refused, true);
+    else if (player.transport.source !== null || hello?.live) notify(refused, true);
   }
   if (opening === name) opening = null;
   writeState();
@@ -350,6 +359,7 @@ function showRegisters() {
 
 /** @param {Opened} message */
 function open(message) {
+  part("roles-button", HTMLButtonElement).hidden = !message.has_roles;
   const again = opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
   opened = message;
   player.transport = { ...player.transport, source: message.name, state: "paused" };

@@ -394,6 +394,56 @@ export interface Opened {
   notes: RecordedNote[];
   zeroed: Zeroing[];
   detections: FoundDetection[];
+  /** Whether it is a file of another program, of which `look` says what it holds. */
+  has_roles: boolean;
+}
+
+/** What an answer changes in a layout: its keys, null for those that it states no more. */
+export type Changes = Record<string, unknown>;
+
+/** A column, an axis or an array of a file: `role`, and what each other role would change. */
+export interface ShownRole {
+  name: string;
+  first: string[];
+  role: string;
+  why: string;
+  certainty: "sure" | "likely" | "open";
+  unit: string;
+  menu: Record<string, Changes>;
+  units: Record<string, Changes>;
+  /** As in `Seen`. */
+  curve: number[];
+}
+
+/** What is said of a whole file: one of some choices, or the value of a key. */
+export type ShownField =
+  | { label: string; value: string | null; choices: Record<string, Changes> }
+  | { label: string; key: string; value: unknown; number: boolean };
+
+/** What a file of another program holds by a layout, `text`; `seen` follows where it can be read. */
+export interface Look {
+  type: "look";
+  name: string;
+  text: string;
+  roles: ShownRole[];
+  /** How many columns are not listed. */
+  more: number;
+  /** What is open. */
+  questions: { why: string; choices: Record<string, Changes> }[];
+  fields: ShownField[];
+  said: string[];
+  /** The layout file of this recording, and that of its folder. */
+  files: [string, string];
+}
+
+/** The sensors of a file as a layout reads it, open questions answered by their first choices. */
+export interface Seen {
+  type: "seen";
+  name: string;
+  /** `levels`: 0 to 255, row by row, of the loaded moment; `curve`: least and greatest of each part of the time in turn, -1: no value. */
+  sensors: { name: string; rows: number; columns: number; levels: number[]; curve: number[]; about: string }[];
+  said: string[];
+  refused: boolean;
 }
 
 /** Events, and the greatest sum of ticks above rest, over time, for the strip: 1000 bins at most. */
@@ -531,6 +581,23 @@ export interface OpenRequest {
   id?: number;
   name: string;
   trial?: string | null;
+}
+
+export interface LookRequest {
+  type: "look";
+  id?: number;
+  name: string;
+  text?: string | null;
+  changes?: Changes | null;
+}
+
+export interface LayRequest {
+  type: "lay";
+  id?: number;
+  name: string;
+  text: string;
+  folder?: boolean;
+  replace?: boolean;
 }
 
 export interface RecordingsRequest {
@@ -700,6 +767,8 @@ export type Message =
   | Training
   | Detections
   | Opened
+  | Look
+  | Seen
   | Overview
   | Transport
   | Labels
@@ -724,6 +793,8 @@ export type Request =
   | StepRequest
   | LiveRequest
   | OpenRequest
+  | LookRequest
+  | LayRequest
   | RecordingsRequest
   | OverviewRequest
   | SetRequest
