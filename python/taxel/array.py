@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel import _core
 from taxel._base.arguments import instance, integer, number, numbers, several, shown, text
 from taxel._base.columns import frozen
 from taxel._base.errors import refused
@@ -472,34 +471,13 @@ class Array:
             return f"rows {self.pitch_mm[0]:g} mm and columns {self.pitch_mm[1]:g} mm apart"
         return "of unknown pitch" if self.pitch_mm is None else f"{self.pitch_mm:g} mm apart"
 
-    def _parts(self) -> _core._Array:
-        """Return the fields as the compiled part reads them."""
-        exists = None if self.exists is None else [bool(e) for e in self.exists.ravel()]
-        pitch = None if self.pitch_mm is None else self._pitch("")
-        positions = self.places
-        lists = None if positions is None else (positions.x.ravel().tolist(), positions.y.ravel().tolist())
-        areas = None if positions is None or positions.area is None else positions.area.ravel().tolist()
-        places = None if positions is None or lists is None else (*lists, areas, positions.unit == "mm")
-        names = None if self.names is None else list(self.names)
-        return self.rows, self.columns, pitch, self.name, exists, places, names
-
-    @classmethod
-    def _from_parts(cls, parts: _core._Array) -> Array:
-        rows, columns, pitch_mm, name, exists, positions, names = parts
-        grid = None if exists is None else np.array(exists).reshape(rows, columns)
-        places = None
-        if positions is not None:
-            x, y, area, in_mm = positions
-            places = Places(x, y, area, "mm" if in_mm else None)  # type: ignore[arg-type]
-        return cls(rows, columns, pitch_mm, grid, name, places, names)
-
     def _geometry(self) -> dict[str, Any]:
         """Return the array as JSON values."""
-        rows, columns, _, name, exists, _, names = self._parts()
-        parts: dict[str, Any] = {"rows": rows, "columns": columns, "pitch_mm": self.pitch_mm}
-        parts |= {"name": name, "exists": exists}
+        exists = None if self.exists is None else self.exists.ravel().tolist()
+        parts: dict[str, Any] = {"rows": self.rows, "columns": self.columns, "pitch_mm": self.pitch_mm}
+        parts |= {"name": self.name, "exists": exists}
         parts |= {} if self.places is None else {"places": self.places._json()}
-        return parts if names is None else parts | {"names": names}
+        return parts if self.names is None else parts | {"names": list(self.names)}
 
     @classmethod
     def _from_geometry(cls, geometry: dict[str, Any]) -> Array:
@@ -513,7 +491,7 @@ class Array:
         return cls(rows, columns, pitch, grid, name, of_each, geometry.get("names"))
 
     def __eq__(self, other: object) -> bool:
-        return self._parts() == other._parts() if isinstance(other, Array) else NotImplemented
+        return self._geometry() == other._geometry() if isinstance(other, Array) else NotImplemented
 
     def __hash__(self) -> int:
         return hash((self.rows, self.columns, self.pitch_mm, self.name))

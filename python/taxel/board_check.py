@@ -236,7 +236,7 @@ def _pattern(events: Events, array: Array, registers: Registers) -> Finding:
         shape = numbers.shape
         rows, lines = (np.broadcast_to(column[at], shape).ravel() for column in (y, x))
         values = _core.pattern_values(
-            array._parts(),
+            array,
             lines.astype(np.uint16),
             rows.astype(np.uint16),
             numbers.ravel().astype(np.uint16),

@@ -121,7 +121,7 @@ class Events(FrozenColumns):
             raise ProblemError("present is given without intensity: give both or neither")
         self.repaired = None if repaired is None else _where_any(frozen_column("repaired", repaired, np.bool_))
         self.markers = _markers(markers)
-        _core.check_events(self._parts())
+        _core.check_events(self)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -211,6 +211,9 @@ class Events(FrozenColumns):
             return next(iter(self[n : n + 1]))
         indices = chosen if isinstance(chosen, slice) else rows("events", chosen, len(self))
         try:
+            if isinstance(indices, slice) and indices.step not in (None, 1):
+                # The compiled part reads contiguous columns.
+                indices = np.arange(len(self))[indices]
             t = self.t[indices]
         except (TypeError, ValueError) as error:
             raise refused("events", f"[{shown(chosen)}]: {error}") from None
@@ -334,31 +337,16 @@ class Events(FrozenColumns):
         intensity: NDArray[np.uint16] | None,
         present: NDArray[np.bool_] | None,
         repaired: NDArray[np.bool_] | None,
-        markers: tuple[tuple[int, bool], ...],
+        markers: Sequence[tuple[int, bool]],
     ) -> Events:
         """Build events from columns that the compiled part or another `Events` has already checked."""
         events = cls.__new__(cls)
-        events.array, events.markers = array, markers
+        events.array, events.markers = array, tuple(markers)
         events.t, events.x, events.y, events.p = frozen(t), frozen(x), frozen(y), frozen(p)
         events.intensity = None if intensity is None else frozen(intensity)
         events.present = None if present is None else frozen(present)
         events.repaired = None if repaired is None else _where_any(frozen(repaired))
         return events
-
-    def _parts(self) -> tuple[Any, ...]:
-        intensity = None
-        if self.intensity is not None:
-            intensity = (np.ascontiguousarray(self.intensity), np.ascontiguousarray(self.present))
-        columns = (np.ascontiguousarray(c) for c in (self.t, self.x, self.y, self.p))
-        repaired = None if self.repaired is None else np.ascontiguousarray(self.repaired)
-        return self.array._parts(), *columns, intensity, repaired, list(self.markers)
-
-    @classmethod
-    def _from_parts(cls, parts: tuple[Any, ...], array: Array | None = None) -> Events:
-        geometry, t, x, y, p, intensity, repaired, markers = parts
-        ticks, present = intensity if intensity is not None else (None, None)
-        sensor = array or Array._from_parts(geometry)
-        return cls._unchecked(t, x, y, p, sensor, ticks, present, repaired, tuple(markers))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Events):

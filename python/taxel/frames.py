@@ -138,7 +138,7 @@ class Frames(FrozenColumns):
             raise refused("held", f" has shape {begins.shape}: must be {array.shape}, that of the array")
         if begins is not None:
             _refuse_infinite("held", begins)
-        values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)
+        values = _core.HeldValues(events, None, None if begins is None else begins.reshape(-1)).at(t)
         return cls(frozen(values).reshape(len(t), *array.shape), frozen(t), unit="ticks", array=array)
 
     @cached_property
@@ -404,10 +404,6 @@ class Frames(FrozenColumns):
     def plot(self, at: int | None = None, ax: Axes | None = None) -> Axes:
         """Draw the pressure map at `at` us, or of the frame with the largest sum."""
         return draw("pressure_map", self, at, ax)  # type: ignore[no-any-return]
-
-    def _parts(self) -> _core._Frames:
-        """Return the columns, which the compiled part reads in place."""
-        return self.array._parts(), self.t, self.values.reshape(-1)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frames):

@@ -209,7 +209,7 @@ class Neuron(Value):
         return _core.neuron_potential(
             self._json(),
             floats("weights", weights),
-            _trains(trains)._parts(),
+            _trains(trains),
             floats("times", times),
             floats("spikes", spikes),
         )
@@ -218,7 +218,7 @@ class Neuron(Value):
         self, weights: ArrayLike, trains: SpikeTrains, threshold: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         factor = number("threshold", threshold)
-        return _core.neuron_run(self._json(), floats("weights", weights), _trains(trains)._parts(), factor)
+        return _core.neuron_run(self._json(), floats("weights", weights), _trains(trains), factor)
 
 
 def _trains(trains: SpikeTrains) -> SpikeTrains:

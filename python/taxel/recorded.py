@@ -114,8 +114,8 @@ def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:
     ticks = np.where(np.isnan(held), _core.UNKNOWN, held).astype(np.uint16).reshape(-1)
     if (ticks == _core.UNKNOWN).all():
         return events
-    first = _core.held_as_events(ticks, int(events.t.min()), events.array._parts())
-    both = (Events._from_parts(first, events.array), events)
+    first = _core.held_as_events(ticks, int(events.t.min()), events.array)
+    both = (Events._unchecked(**first, array=events.array), events)
     names = ("t", "x", "y", "p", "intensity", "present")
     columns: list[Any] = [np.concatenate([getattr(e, name) for e in both]) for name in names]
     t, x, y, p, ticks, present = columns

@@ -85,7 +85,7 @@ class SpikeTrains(FrozenColumns):
         )
         self.kind: Kind = _kind(kind, self.values)
         self.start, self.stop = number("start", start), number("stop", stop)
-        _core.check_spikes(self._parts())
+        _core.check_spikes(self)
 
     @classmethod
     def from_lists(
@@ -238,7 +238,7 @@ class SpikeTrains(FrozenColumns):
         ------
         ProblemError : graded trains, whose values multiply the weight
         """
-        return self._from_parts(_core.split_by_sign(self._parts()))
+        return self._of_own(**_core.split_by_sign(self))
 
     def between(self, start: float, stop: float) -> SpikeTrains:
         """Return the spikes of ``start <= t < stop``, with that window; times stay as they are.
@@ -499,14 +499,6 @@ class SpikeTrains(FrozenColumns):
     def _values(self) -> list[NDArray[np.float32]] | None:
         """Return the values train by train."""
         return None if self.values is None else np.split(self.values, self.offsets[1:-1])
-
-    def _parts(self) -> tuple[Any, ...]:
-        return self.times, self.offsets, self.values, self.kind, self.start, self.stop
-
-    @classmethod
-    def _from_parts(cls, parts: tuple[Any, ...]) -> SpikeTrains:
-        times, offsets, values, kind, start, stop = parts
-        return cls._of_own(times, offsets, start, stop, values, kind)
 
     @classmethod
     def _of_own(

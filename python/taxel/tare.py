@@ -111,9 +111,9 @@ class Tare(Saved):
                 f"{x.t.max()} us"
             )
         if isinstance(x, Events):
-            return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
+            return cls.from_json(_core.tare_of_events(x, *window, note))
         if isinstance(x, Frames):
-            return cls.from_json(_core.tare_of_frames(x._parts(), *window, note))
+            return cls.from_json(_core.tare_of_frames(x, *window, note))
         raise refused("x", f" is {shown(x)}: must be a taxel.Events or taxel.Frames")
 
     def off(self, frames: Frames) -> Frames:

@@ -107,7 +107,7 @@ class EpochLearner(SpikeLearner):
 
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
         rule, weights = self._json(), self._fitted()
-        return [_rules.run_epochs(rule, weights, pattern._parts()) for pattern in patterns]
+        return [_rules.run_epochs(rule, weights, pattern) for pattern in patterns]
 
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike
@@ -129,7 +129,7 @@ class EpochLearner(SpikeLearner):
         ------
         ProblemError : invalid weights, pattern or targets
         """
-        trains = instance("pattern", pattern, SpikeTrains)._parts()
+        trains = instance("pattern", pattern, SpikeTrains)
         change, spikes = _rules.change_epochs(
             self._json(), floats("weights", weights), trains, floats("targets", targets)
         )

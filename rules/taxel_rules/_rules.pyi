@@ -1,11 +1,11 @@
-"""The compiled part of taxel_rules: parameters as JSON, spike trains as their `_parts()` give them."""
+"""The compiled part of taxel_rules: parameters as JSON."""
 
 from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._core import _Spikes
+from taxel import SpikeTrains
 
 # what is known of a learner's parameters (defaults, required, ranges); one's, with every default filled in
 
@@ -25,26 +25,28 @@ class Trained:
 def rule_names() -> list[str]: ...
 def fit_epochs(
     parameters: str,
-    patterns: list[_Spikes],
+    patterns: list[SpikeTrains],
     targets: list[NDArray[np.float64]],
     start: NDArray[np.float64] | None,
     progress: Any,
 ) -> Trained: ...
 def change_epochs(
-    parameters: str, weights: NDArray[np.float64], pattern: _Spikes, targets: NDArray[np.float64]
+    parameters: str, weights: NDArray[np.float64], pattern: SpikeTrains, targets: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]: ...
-def run_epochs(parameters: str, weights: NDArray[np.float64], pattern: _Spikes) -> NDArray[np.float64]: ...
-def rows_skim(parameters: str, patterns: list[_Spikes], targets: list[NDArray[np.float64]] | None) -> list[int]: ...
+def run_epochs(parameters: str, weights: NDArray[np.float64], pattern: SpikeTrains) -> NDArray[np.float64]: ...
+def rows_skim(parameters: str, patterns: list[SpikeTrains], targets: list[NDArray[np.float64]] | None) -> list[int]: ...
 def fit_tempotron(
     parameters: str,
-    patterns: list[_Spikes],
+    patterns: list[SpikeTrains],
     labels: list[bool],
     start: NDArray[np.float64] | None,
     progress: Any,
 ) -> Trained: ...
-def peak_tempotron(parameters: str, weights: NDArray[np.float64], pattern: _Spikes) -> tuple[float, float, float]: ...
+def peak_tempotron(
+    parameters: str, weights: NDArray[np.float64], pattern: SpikeTrains
+) -> tuple[float, float, float]: ...
 def change_tempotron(
-    parameters: str, weights: NDArray[np.float64], pattern: _Spikes, label: bool
+    parameters: str, weights: NDArray[np.float64], pattern: SpikeTrains, label: bool
 ) -> NDArray[np.float64]: ...
 
 @final
@@ -54,4 +56,4 @@ class STDP:
     def weights(self) -> NDArray[np.float64]: ...
     def set_weights(self, weights: NDArray[np.float64]) -> None: ...
     def rest(self) -> None: ...
-    def push(self, piece: _Spikes, learn: bool) -> NDArray[np.float64]: ...
+    def push(self, piece: SpikeTrains, learn: bool) -> NDArray[np.float64]: ...

@@ -173,7 +173,7 @@ class SKIM(SpikeLearner):
         ProblemError : an invalid pattern
         """
         trains = instance("pattern", pattern, SpikeTrains)
-        (rows,) = _rules.rows_skim(self._json(), [trains._parts()], None)
+        (rows,) = _rules.rows_skim(self._json(), [trains], None)
         return np.concatenate(list(self._blocks(trains, rows)))
 
     def output(self, pattern: SpikeTrains) -> NDArray[np.float64]:
@@ -199,7 +199,7 @@ class SKIM(SpikeLearner):
         63
         """
         weights, trains = self._fitted(), instance("pattern", pattern, SpikeTrains)
-        (rows,) = _rules.rows_skim(self._json(), [trains._parts()], None)
+        (rows,) = _rules.rows_skim(self._json(), [trains], None)
         return self._output(weights, trains, rows)
 
     def predict(self, patterns: Sequence[SpikeTrains], *, threshold: float | None = None) -> list[NDArray[np.float64]]:
@@ -225,7 +225,7 @@ class SKIM(SpikeLearner):
         if at is None:
             raise refused("threshold", ": must be given, because no fit has chosen one")
         trains = patterns_of(patterns)
-        rows = _rules.rows_skim(self._json(), [pattern._parts() for pattern in trains], None)
+        rows = _rules.rows_skim(self._json(), trains, None)
         outputs = [self._output(weights, *of_one) for of_one in zip(trains, rows, strict=True)]
         return [self._crossings(*of_one, at) for of_one in zip(trains, outputs, strict=True)]
 

@@ -161,12 +161,12 @@ class STDP(SpikeLearner):
         for pattern in patterns:
             neuron = _rules.STDP(self._json(), len(weights))
             neuron.set_weights(weights)
-            fired.append(neuron.push(pattern._parts(), False))
+            fired.append(neuron.push(pattern, False))
         return fired
 
     def _learn(self, piece: SpikeTrains) -> Self:
         try:
-            self.spikes_ = self._neuron.push(piece._parts(), True)
+            self.spikes_ = self._neuron.push(piece, True)
         finally:
             self.weights_ = self._neuron.weights
         return self

@@ -126,7 +126,7 @@ class Tempotron(Learner):
         ProblemError : invalid patterns, labels or first weights
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
-        trains = [pattern._parts() for pattern in patterns_of(patterns)]
+        trains = patterns_of(patterns)
         truth = _labels(labels)
         first = None if start is None else floats("start", start)
         trained = _rules.fit_tempotron(self._json(), trains, truth, first, optional(callback, "progress", progress))
@@ -202,7 +202,7 @@ class Tempotron(Learner):
         >>> [round(value, 3) for value in Tempotron().peak([0.5, 0.25], trains)]
         [0.614, 24.05, inf]
         """
-        trains = instance("pattern", pattern, SpikeTrains)._parts()
+        trains = instance("pattern", pattern, SpikeTrains)
         return _rules.peak_tempotron(self._json(), floats("weights", weights), trains)
 
     def change(self, weights: ArrayLike, pattern: SpikeTrains, label: bool) -> NDArray[np.float64]:
@@ -224,7 +224,7 @@ class Tempotron(Learner):
         ------
         ProblemError : invalid weights, pattern or label
         """
-        trains = instance("pattern", pattern, SpikeTrains)._parts()
+        trains = instance("pattern", pattern, SpikeTrains)
         return _rules.change_tempotron(self._json(), floats("weights", weights), trains, flag("label", label))
 
 

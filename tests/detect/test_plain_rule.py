@@ -89,7 +89,7 @@ def test_a_count_by_running_range_is_what_a_loop_over_frames_counts():
     changes = [
         (now, count) for now, count, last in zip(t.tolist(), counts, [0, *counts], strict=False) if count != last
     ]
-    [curve] = taxel._core.LoadCurve.of_frames(["range_count"], levels, 0.0, frames._parts(), None, None)
+    [curve] = taxel._core.LoadCurve.of_frames(["range_count"], levels, 0.0, frames, None, None)
     assert list(zip(*(column.tolist() for column in curve.changes()), strict=True)) == changes
     # It needs no tare.
     rule = PlainRule("range_count", 4, 2.5 / 4, levels=levels, dated_at=3.0)
@@ -165,7 +165,7 @@ def test_what_does_not_fit_together_is_refused(arguments, options):
 @given(events())
 def test_curves_that_are_measured_at_once_are_those_measured_alone(source):
     def curves(*quantities):
-        return taxel._core.LoadCurve.of_events(list(quantities), [], FLOOR, source._parts(), 192.0, 2, tare().to_json())
+        return taxel._core.LoadCurve.of_events(list(quantities), [], FLOOR, source, 192.0, 2, tare().to_json())
 
     names = ["total", "local_load", "local_rise", "local_fall"]
     for name, curve in zip(names, curves(*names), strict=True):

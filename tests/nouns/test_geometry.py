@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
-from taxel import Array, Calibration, Frames, Places, ProblemError, Readout, Tare
+from taxel import Array, Calibration, Events, Frames, Places, ProblemError, Readout, Tare, _core
 from taxel.calibration import Load
 
 PLATE = Array(4, 3, (7.62, 5.08), name="plate")
@@ -45,7 +45,8 @@ def arrays(draw: st.DrawFn) -> Array:
 @given(arrays())
 def test_files_and_the_compiled_part_keep_all_of_a_sensor(array: Array) -> None:
     assert Array._from_geometry(json.loads(json.dumps(array._geometry()))) == array
-    assert Array._from_parts(array._parts()) == array
+    compiled = _core.PanelRecording.of_events(Events([], [], [], [], array=array), None, 0, ".", 0)
+    assert Array._from_geometry(compiled.array()) == array
 
 
 @given(array=arrays())

@@ -177,7 +177,7 @@ def test_changes_of_frames_are_those_of_each_taxel_alone(seed: int) -> None:
     n, rows, columns = (int(random.integers(*among)) for among in ((0, 40), (1, 4), (1, 5)))
     values = random.integers(0, 3, (n, rows, columns)).astype(np.float32)
     values[random.random(values.shape) < 0.2] = np.nan
-    number, on = _core.changes_of_frames(taxel.Frames(values, np.arange(n))._parts())
+    number, on = _core.changes_of_frames(taxel.Frames(values, np.arange(n)))
     for k, of in enumerate(values.reshape(n, rows * columns).T):
         # A NaN has no direction of change.
         ways = [int(b > a) - int(b < a) for a, b in pairwise(of.tolist()) if b > a or b < a]

@@ -69,7 +69,7 @@ def by_rust(rows, columns, values):
     base = taxel._core.registers_preset(PRESETS[0]) | values
     try:
         given = list(values.items())
-        taxel._core.registers_with(json.dumps(base), [(n, v) for n, v in given if n != "channels"], array._parts())
+        taxel._core.registers_with(json.dumps(base), [(n, v) for n, v in given if n != "channels"], array)
     except taxel.DeviceError as error:
         return str(error)
     return None

@@ -3,17 +3,18 @@
 //! Contiguous arrays of the right type are read in place, under a borrow that is held for the whole call; the Python
 //! side makes them so (`numpy.ascontiguousarray`) before it calls.
 
-use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1, PyReadwriteArray1};
+use numpy::ndarray::Dimension;
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1};
 use pyo3::Borrowed;
 use pyo3::prelude::*;
-use taxel_core::array::{Pitch, PlaceUnit, Places};
+use pythonize::depythonize;
 use taxel_core::wire::Columns;
 use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeKind, SpikeTrains};
 
 use crate::errors::{ProblemError, core};
 
-/// The entries of a one-dimensional array, in place.
-pub fn slice<'a, T: Element>(name: &str, array: &'a PyReadonlyArray1<'_, T>) -> PyResult<&'a [T]> {
+/// The entries of an array, in place.
+pub fn slice<'a, T: Element, D: Dimension>(name: &str, array: &'a PyReadonlyArray<'_, T, D>) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| ProblemError::new_err(format!("{name}: must be contiguous")))
 }
 
@@ -30,33 +31,15 @@ pub fn column<T: Element>(py: Python<'_>, values: Vec<T>) -> Column<T> {
     array(py, values).unbind()
 }
 
-/// An array's geometry as Python hands it over: rows, columns, pitch in mm (rows, columns), name, which exist, places,
-/// names of the taxels.
-pub type ArrayParts =
-    (u16, u16, Option<(f64, f64)>, String, Option<Vec<bool>>, Option<PlacesParts>, Option<Vec<String>>);
+/// The geometry of an `Array` of Python, which has checked it.
+pub struct ArrayIn(pub Array);
 
-/// Places by taxel: x, y, areas, whether they are in mm.
-type PlacesParts = (Vec<f64>, Vec<f64>, Option<Vec<f64>>, bool);
+impl FromPyObject<'_, '_> for ArrayIn {
+    type Error = PyErr;
 
-/// An array's geometry, checked.
-///
-/// # Errors
-///
-/// A `ProblemError` for a geometry that makes no sense.
-pub fn to_array((rows, columns, pitch_mm, name, exists, places, names): ArrayParts) -> PyResult<Array> {
-    let pitch_mm = pitch_mm.map(|(rows, columns)| Pitch { rows, columns });
-    let places = places.map(|(x, y, area, mm)| Places { x, y, area, unit: mm.then_some(PlaceUnit::Mm) });
-    let array = Array { rows, columns, pitch_mm, name, exists, places, names };
-    array.check().map_err(core)?;
-    Ok(array)
-}
-
-/// The geometry as Python gets it.
-#[must_use]
-pub fn from_array(array: &Array) -> ArrayParts {
-    let Array { rows, columns, pitch_mm, name, exists, places, names } = array.clone();
-    let places = places.map(|Places { x, y, area, unit }| (x, y, area, unit.is_some()));
-    (rows, columns, pitch_mm.map(|pitch| (pitch.rows, pitch.columns)), name, exists, places, names)
+    fn extract(object: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        Ok(Self(depythonize(&object.call_method0("_geometry")?)?))
+    }
 }
 
 /// What was filled of columns, by name.
@@ -78,121 +61,131 @@ pub fn from_columns<'py>(py: Python<'py>, columns: &Columns<'_>) -> FilledOut<'p
     FilledOut { rows: columns.rows, paired: columns.paired, repaired, markers }
 }
 
-/// Events whose columns stay where Python has them, as (array, t, x, y, p, intensity with present, repaired, markers).
+/// `Events` of Python, whose columns stay where Python has them.
+#[derive(FromPyObject)]
 pub struct EventsIn<'py> {
-    array: Array,
+    array: ArrayIn,
     t: PyReadonlyArray1<'py, i64>,
     x: PyReadonlyArray1<'py, u16>,
     y: PyReadonlyArray1<'py, u16>,
     p: PyReadonlyArray1<'py, bool>,
-    intensity: Option<(PyReadonlyArray1<'py, u16>, PyReadonlyArray1<'py, bool>)>,
+    intensity: Option<PyReadonlyArray1<'py, u16>>,
+    present: Option<PyReadonlyArray1<'py, bool>>,
     repaired: Option<PyReadonlyArray1<'py, bool>>,
+    #[pyo3(from_py_with = to_markers)]
     markers: Vec<Marker>,
 }
 
-impl<'py> FromPyObject<'_, 'py> for EventsIn<'py> {
-    type Error = PyErr;
-
-    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let (parts, t, x, y, p, intensity, repaired, markers) = object.extract()?;
-        let marker = |(t, start): (i64, bool)| Marker { t, start };
-        let markers = Vec::into_iter(markers).map(marker).collect();
-        Ok(Self { array: to_array(parts)?, t, x, y, p, intensity, repaired, markers })
-    }
+fn to_markers(markers: &Bound<'_, PyAny>) -> PyResult<Vec<Marker>> {
+    Ok(markers.extract::<Vec<_>>()?.into_iter().map(|(t, start)| Marker { t, start }).collect())
 }
 
 impl EventsIn<'_> {
     /// The columns in place, to be read without the GIL; who reads them checks them.
     pub fn view(&self) -> PyResult<EventsView<'_>> {
+        let both = self.intensity.as_ref().zip(self.present.as_ref());
+        let both = both.map(|(ticks, present)| -> PyResult<_> {
+            Ok(IntensitiesView { ticks: slice("intensity", ticks)?, present: slice("present", present)? })
+        });
         Ok(EventsView {
-            array: &self.array,
+            array: &self.array.0,
             t: slice("t", &self.t)?,
             x: slice("x", &self.x)?,
             y: slice("y", &self.y)?,
             p: slice("p", &self.p)?,
-            intensity: match &self.intensity {
-                None => None,
-                Some((ticks, present)) => {
-                    Some(IntensitiesView { ticks: slice("intensity", ticks)?, present: slice("present", present)? })
-                }
-            },
+            intensity: both.transpose()?,
             repaired: self.repaired.as_ref().map(|column| slice("repaired", column)).transpose()?,
             markers: &self.markers,
         })
     }
 }
 
-/// Columns for a decoder to fill, as Python lays them out: t, x, y, ticks, and p, present as bytes.
-pub type ColumnsIn<'py> = (
-    PyReadwriteArray1<'py, i64>,
-    PyReadwriteArray1<'py, u16>,
-    PyReadwriteArray1<'py, u16>,
-    PyReadwriteArray1<'py, u16>,
-    PyReadwriteArray1<'py, u8>,
-    PyReadwriteArray1<'py, u8>,
-);
+/// `Columns` of Python for a decoder to fill, p and present as bytes.
+#[derive(FromPyObject)]
+pub struct ColumnsIn<'py> {
+    t: PyReadwriteArray1<'py, i64>,
+    x: PyReadwriteArray1<'py, u16>,
+    y: PyReadwriteArray1<'py, u16>,
+    ticks: PyReadwriteArray1<'py, u16>,
+    p: PyReadwriteArray1<'py, u8>,
+    present: PyReadwriteArray1<'py, u8>,
+}
 
 /// The columns in place, to be filled without the GIL.
-pub fn to_columns<'a>((t, x, y, ticks, p, present): &'a mut ColumnsIn<'_>) -> PyResult<Columns<'a>> {
+pub fn to_columns<'a>(columns: &'a mut ColumnsIn<'_>) -> PyResult<Columns<'a>> {
     fn open<'a, T: Element>(column: &'a mut PyReadwriteArray1<'_, T>) -> PyResult<&'a mut [T]> {
         column.as_slice_mut().map_err(|_| ProblemError::new_err("columns must be contiguous"))
     }
+    let ColumnsIn { t, x, y, ticks, p, present } = columns;
     Columns::new(open(t)?, [open(x)?, open(y)?, open(ticks)?], [open(p)?, open(present)?]).map_err(core)
 }
 
-/// Frames whose values stay where Python has them, as (array, t, values one frame after the other).
+/// `Frames` of Python, whose values stay where Python has them.
+#[derive(FromPyObject)]
 pub struct FramesIn<'py> {
-    array: Array,
+    array: ArrayIn,
     t: PyReadonlyArray1<'py, i64>,
-    values: PyReadonlyArray1<'py, f32>,
-}
-
-impl<'py> FromPyObject<'_, 'py> for FramesIn<'py> {
-    type Error = PyErr;
-
-    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let (parts, t, values) = object.extract()?;
-        Ok(Self { array: to_array(parts)?, t, values })
-    }
+    values: PyReadonlyArrayDyn<'py, f32>,
 }
 
 impl FramesIn<'_> {
     /// As [`EventsIn::view`].
     pub fn view(&self) -> PyResult<FramesView<'_>> {
-        Ok(FramesView { array: &self.array, t: slice("t", &self.t)?, values: slice("values", &self.values)? })
+        Ok(FramesView { array: &self.array.0, t: slice("t", &self.t)?, values: slice("values", &self.values)? })
     }
 }
 
-/// Events as Python gets them: the same parts, as new arrays.
-pub type EventsOut<'py> = (
-    ArrayParts,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u16>>,
-    Bound<'py, PyArray1<u16>>,
-    Bound<'py, PyArray1<bool>>,
-    Option<(Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<bool>>)>,
-    Option<Bound<'py, PyArray1<bool>>>,
-    Vec<(i64, bool)>,
-);
+/// Events as Python gets them, by name, on an array that it knows.
+#[derive(IntoPyObject)]
+pub struct EventsOut<'py> {
+    t: Bound<'py, PyArray1<i64>>,
+    x: Bound<'py, PyArray1<u16>>,
+    y: Bound<'py, PyArray1<u16>>,
+    p: Bound<'py, PyArray1<bool>>,
+    intensity: Option<Bound<'py, PyArray1<u16>>>,
+    present: Option<Bound<'py, PyArray1<bool>>>,
+    repaired: Option<Bound<'py, PyArray1<bool>>>,
+    markers: Vec<(i64, bool)>,
+}
 
 /// Events as Python gets them.
 #[must_use]
 pub fn from_events(py: Python<'_>, events: Events) -> EventsOut<'_> {
-    (
-        from_array(&events.array),
-        array(py, events.t),
-        array(py, events.x),
-        array(py, events.y),
-        array(py, events.p),
-        events.intensity.map(|i| (array(py, i.ticks), array(py, i.present))),
-        events.repaired.map(|column| array(py, column)),
-        events.markers.iter().map(|m| (m.t, m.start)).collect(),
-    )
+    let (intensity, present) = events.intensity.map(|i| (array(py, i.ticks), array(py, i.present))).unzip();
+    EventsOut {
+        t: array(py, events.t),
+        x: array(py, events.x),
+        y: array(py, events.y),
+        p: array(py, events.p),
+        intensity,
+        present,
+        repaired: events.repaired.map(|column| array(py, column)),
+        markers: events.markers.iter().map(|m| (m.t, m.start)).collect(),
+    }
 }
 
-/// Spike trains as Python passes them: times, offsets, values, kind, start, stop; ms.
-pub type SpikesParts<'py> =
-    (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<PyReadonlyArray1<'py, f32>>, String, f64, f64);
+/// The columns of `SpikeTrains` of Python; ms.
+#[derive(FromPyObject)]
+pub struct SpikesColumns<'py> {
+    times: PyReadonlyArray1<'py, f64>,
+    offsets: PyReadonlyArray1<'py, i64>,
+    values: Option<PyReadonlyArray1<'py, f32>>,
+    kind: String,
+    start: f64,
+    stop: f64,
+}
+
+impl SpikesColumns<'_> {
+    /// Reads the columns in place: times, offsets, kind with values, start and stop.
+    pub fn read<T>(
+        &self,
+        work: impl FnOnce(&[f64], Vec<usize>, (SpikeKind, Option<&[f32]>), (f64, f64)) -> PyResult<T>,
+    ) -> PyResult<T> {
+        let values = self.values.as_ref().map(|values| slice("values", values)).transpose()?;
+        let kind = SpikeKind::named(&self.kind).map_err(core)?;
+        work(slice("times", &self.times)?, to_offsets(&self.offsets)?, (kind, values), (self.start, self.stop))
+    }
+}
 
 /// Where trains begin and end.
 pub fn to_offsets(offsets: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
@@ -207,11 +200,9 @@ impl FromPyObject<'_, '_> for SpikesIn {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
-        let (times, offsets, values, kind, start, stop): SpikesParts<'_> = object.extract()?;
-        let offsets = to_offsets(&offsets)?;
-        let times = slice("times", &times)?;
-        let values = (SpikeKind::named(&kind).map_err(core)?, values.as_ref().map(|v| slice("values", v)).transpose()?);
-        SpikeTrains::copy_of(times, offsets, values, (start, stop)).map_err(core).map(Self)
+        object.extract::<SpikesColumns<'_>>()?.read(|times, offsets, values, window| {
+            SpikeTrains::copy_of(times, offsets, values, window).map_err(core).map(Self)
+        })
     }
 }
 
@@ -220,14 +211,28 @@ pub fn to_patterns(patterns: Vec<SpikesIn>) -> Vec<SpikeTrains> {
     patterns.into_iter().map(|SpikesIn(pattern)| pattern).collect()
 }
 
-/// Spike trains as Python gets them: the same parts, as new arrays.
-pub type SpikesOut<'py> =
-    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>, Option<Bound<'py, PyArray1<f32>>>, &'static str, f64, f64);
+/// Spike trains as Python gets them, by name.
+#[derive(IntoPyObject)]
+pub struct SpikesOut<'py> {
+    times: Bound<'py, PyArray1<f64>>,
+    offsets: Bound<'py, PyArray1<i64>>,
+    values: Option<Bound<'py, PyArray1<f32>>>,
+    kind: &'static str,
+    start: f64,
+    stop: f64,
+}
 
 /// Spike trains as Python gets them.
 #[must_use]
 pub fn from_spikes(py: Python<'_>, trains: SpikeTrains) -> SpikesOut<'_> {
     let offsets = trains.offsets.iter().map(|&o| i64::try_from(o).unwrap_or(i64::MAX)).collect();
     let SpikeTrains { times, kind, values, start, stop, .. } = trains;
-    (array(py, times), array(py, offsets), values.map(|v| array(py, v)), kind.name(), start, stop)
+    SpikesOut {
+        times: array(py, times),
+        offsets: array(py, offsets),
+        values: values.map(|v| array(py, v)),
+        kind: kind.name(),
+        start,
+        stop,
+    }
 }

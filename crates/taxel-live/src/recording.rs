@@ -30,7 +30,6 @@ pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use mcap_reader::{Datagrams, DecodedRecording, Message, Reader, Remarks};
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
-use stream::StreamColumns;
 pub use stream::StreamFaults;
 pub use topic::Topic;
 pub use verdict::{
@@ -79,9 +78,6 @@ pub struct Header {
     /// Where the sensor lies.
     #[serde(flatten)]
     pub placement: Placement,
-    /// Of a recording before 0.1.0, what its lines of numbers are: as a reader has it, `frames` states them too.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stream: Option<StreamColumns>,
     /// For a source of frames, their unit and more; none for a board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<FrameProperties>,
@@ -185,19 +181,12 @@ impl Header {
     fn topics(&self) -> impl Iterator<Item = Topic> {
         let frames = self.frames.is_some();
         let belongs = move |topic: &Topic| match topic {
-            Topic::Samples => false,
             Topic::Frames => frames,
             // Any viewer shows frames.
             Topic::Datagrams | Topic::Pressure => !frames,
             _ => true,
         };
         Topic::ALL.into_iter().filter(belongs)
-    }
-
-    /// States lines that were recorded as JSON as frames too.
-    fn state_frames(&mut self) {
-        self.sources.iter_mut().for_each(Self::state_frames);
-        self.frames = self.stream.as_ref().map(StreamColumns::properties).or(self.frames.take());
     }
 
     /// Checks the properties that a file states.
@@ -209,10 +198,6 @@ impl Header {
         }
         if !(-limits::TIME_US..=limits::TIME_US).contains(&self.decoding.origin_us) {
             return Err(problem!("origin_us"; " is {}: must be within 142 years of 0", self.decoding.origin_us));
-        }
-        if let Some(n) = self.stream.as_ref().map(|stream| stream.values().count()).filter(|&n| n != self.array.len()) {
-            let (name, taxels) = (&self.name, self.array.len());
-            return Err(problem!("source {name}: {n} columns of values for {taxels} taxels; must be one per taxel"));
         }
         if let Some(frames) = &self.frames {
             frames.check(&self.name, self.array.columns)?;
@@ -251,7 +236,6 @@ impl Header {
             started_ns,
             name: board(),
             placement: Placement::default(),
-            stream: None,
             frames: None,
             sources: vec![],
         }

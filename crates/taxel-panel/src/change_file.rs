@@ -1,4 +1,4 @@
-//! Changes in a temporary file.
+//! Changes in a temporary file, block by block, each with the extents of the taxels.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -9,6 +9,11 @@ use taxel_core::{Place, problem};
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::read_at::read_exact_at;
 use taxel_live::{Error, Result};
+
+/// The least, the greatest and the last value of a taxel among changes; the last is [`UNKNOWN`] where it has none.
+///
+/// [`UNKNOWN`]: taxel_core::held::UNKNOWN
+pub(super) type Extent = [u16; 3];
 
 /// Bytes of a change, in memory and in the file.
 pub(super) const BYTES: usize = size_of::<TaxelChange>();
@@ -22,7 +27,7 @@ const DELETE_ON_CLOSE: u32 = 0x0400_0000;
 pub(super) struct ChangeFile {
     file: File,
     folder: PathBuf,
-    /// Number of changes in it.
+    /// Number of bytes in it.
     written: u64,
 }
 
@@ -41,32 +46,45 @@ impl ChangeFile {
         Ok(Self { file, folder, written: 0 })
     }
 
-    /// Appends changes; returns the number of those before them.
+    /// Appends the changes of a block, and then its extents; returns where it begins.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where there is no room.
-    pub(super) fn push(&mut self, changes: &[TaxelChange]) -> Result<u64> {
-        let (before, bytes) = (self.written, changes.iter().flat_map(to_bytes).collect::<Vec<u8>>());
-        self.written += changes.len() as u64;
+    pub(super) fn push(&mut self, changes: &[TaxelChange], extents: &[Extent]) -> Result<u64> {
+        let mut bytes: Vec<u8> = changes.iter().flat_map(to_bytes).collect();
+        bytes.extend(extents.iter().flatten().flat_map(|value| value.to_le_bytes()));
+        let begin = self.written;
+        self.written += bytes.len() as u64;
         self.file.write_all(&bytes).map_err(|error| no_room(&self.folder, self.written, &error))?;
-        Ok(before)
+        Ok(begin)
     }
 
-    /// So many changes, after the first ones.
+    /// The changes of a block that begins there.
     ///
     /// # Errors
     ///
     /// `File` where it cannot be read.
-    pub(super) fn read(&self, before: u64, count: usize) -> Result<Vec<TaxelChange>> {
+    pub(super) fn changes(&self, begin: u64, count: usize) -> Result<Vec<TaxelChange>> {
         let mut bytes = vec![0; count * BYTES];
-        read_exact_at(&self.file, &mut bytes, before * BYTES as u64).map_err(Error::file(&self.folder))?;
+        read_exact_at(&self.file, &mut bytes, begin).map_err(Error::file(&self.folder))?;
         Ok(bytes.as_chunks().0.iter().map(of_bytes).collect())
+    }
+
+    /// The extent of a taxel in a block of so many changes that begins there.
+    ///
+    /// # Errors
+    ///
+    /// `File` where it cannot be read.
+    pub(super) fn extent(&self, begin: u64, count: usize, taxel: usize) -> Result<Extent> {
+        let (mut bytes, at) = ([0; size_of::<Extent>()], count * BYTES + taxel * size_of::<Extent>());
+        read_exact_at(&self.file, &mut bytes, begin + at as u64).map_err(Error::file(&self.folder))?;
+        let [a, b, c, d, e, f] = bytes;
+        Ok([[a, b], [c, d], [e, f]].map(u16::from_le_bytes))
     }
 }
 
-fn no_room(folder: &Path, changes: u64, error: &io::Error) -> Error {
-    let bytes = changes * BYTES as u64;
+fn no_room(folder: &Path, bytes: u64, error: &io::Error) -> Error {
     let size = problem!("has no room for a temporary file of {bytes} bytes or more, which the view needs: {error}");
     size.at(Place::file(folder)).into()
 }

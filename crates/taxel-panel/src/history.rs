@@ -25,31 +25,21 @@ impl TaxelHistory {
         Self { taxel, column_us, first: (first, held), last: held, columns: VecDeque::new() }
     }
 
-    /// Applies the next changes.
+    /// Applies the next changes; those of other taxels are ignored.
     pub fn push(&mut self, changes: &[TaxelChange]) {
-        changes.iter().for_each(|change| self.apply(change));
+        let taxel = self.taxel;
+        let own = changes.iter().filter(|change| change.taxel == taxel && change.ticks != UNKNOWN);
+        own.for_each(|change| self.extend(change.t, [change.ticks; 3]));
     }
 
-    /// Applies a change; those of other taxels are ignored.
-    pub fn apply(&mut self, change: &TaxelChange) {
-        if change.taxel != self.taxel || change.ticks == UNKNOWN {
-            return;
-        }
-        let column = column_of(change.t, self.column_us);
-        let before = self.last;
-        self.last = change.ticks;
+    /// Applies changes that are all in the column of `t` us, of which these are the least, the greatest and the last value.
+    pub(crate) fn extend(&mut self, t: i64, [least, greatest, last]: [u16; 3]) {
+        let column = column_of(t, self.column_us);
+        let before = std::mem::replace(&mut self.last, last);
         match self.columns.back_mut() {
-            Some((there, [least, greatest, last])) if *there >= column => {
-                (*least, *greatest, *last) = ((*least).min(change.ticks), (*greatest).max(change.ticks), change.ticks);
-            }
-            _ => {
-                let (least, greatest) = if before == UNKNOWN {
-                    (change.ticks, change.ticks)
-                } else {
-                    (before.min(change.ticks), before.max(change.ticks))
-                };
-                self.columns.push_back((column, [least, greatest, change.ticks]));
-            }
+            Some((there, all)) if *there >= column => *all = [all[0].min(least), all[1].max(greatest), last],
+            _ if before == UNKNOWN => self.columns.push_back((column, [least, greatest, last])),
+            _ => self.columns.push_back((column, [before.min(least), before.max(greatest), last])),
         }
         while self.columns.len() > 1 && self.columns[1].0 <= column - SPAN {
             if let Some((gone, [_, _, last])) = self.columns.pop_front() {
@@ -94,8 +84,7 @@ mod tests {
     fn a_history_has_every_extreme_and_goes_on_through_silence() {
         let mut history = TaxelHistory::new(1, 40, Some(-4000), COLUMN_US);
         for (t, ticks) in [(0, 50), (1000, 20), (2000, 45), (12_000, 60)] {
-            history.apply(&change(t, 1, ticks));
-            history.apply(&change(t, 0, 999));
+            history.push(&[change(t, 1, ticks), change(t, 0, 999)]);
         }
         let mut bytes = vec![];
         history.write(-2..5, &mut bytes);

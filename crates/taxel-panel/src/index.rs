@@ -1,12 +1,14 @@
 //! The index of a source: the changes of a recording, or the latest of a live board, readable from any time on.
 //!
 //! It stores the changes in blocks, and keyframes: what the array held before some of the blocks. Going on from a keyframe gives
-//! the same as going on from the beginning.
+//! the same as going on from the beginning. Of a block of a recording it also has the least and the greatest value of each taxel, so
+//! that a window of hours is drawn without its changes.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use taxel_core::held::UNKNOWN;
 use taxel_core::problem;
 use taxel_core::rest::{LOADED_TICKS, preload, preload_text};
 use taxel_live::Result;
@@ -15,9 +17,10 @@ use taxel_live::pipeline::TaxelChange;
 
 use crate::activity::Activity;
 use crate::block::Block;
-use crate::change_file::{BYTES, ChangeFile};
+use crate::change_file::{BYTES, ChangeFile, Extent};
 use crate::columns::{COLUMN_US, TimeColumns, column_of};
 use crate::event_rate::EventRate;
+use crate::history::TaxelHistory;
 use crate::state::{ArrayState, Keyframe, Sensor};
 
 /// Memory that the keyframes of a recording may take, bytes.
@@ -48,14 +51,18 @@ pub enum Kept {
     },
 }
 
-/// A block, whose changes are in memory or in the file.
+/// A block, whose changes and extents are in memory or in the file.
 #[derive(Debug)]
 struct StoredBlock {
     block: Block,
-    /// Number of changes before it, and of its own.
-    before: u64,
+    /// Number of its changes, and the first and last time of them, us.
     len: usize,
-    in_file: bool,
+    range: Option<(i64, i64)>,
+    /// By taxel; none of a live source, and of a block that has fewer changes than the array has taxels.
+    extents: Vec<Extent>,
+    has_extents: bool,
+    /// Where it begins in the file, if it is there.
+    place: Option<u64>,
 }
 
 #[derive(Debug)]
@@ -121,12 +128,20 @@ impl Index {
             store.bytes += key.bytes();
             store.keys.push_back((number, Arc::new(key)));
         }
-        if !block.changes.is_empty() {
-            let range = store.range.unwrap_or((i64::MAX, i64::MIN));
-            let wider = |(first, last): (i64, i64), change: &TaxelChange| (first.min(change.t), last.max(change.t));
-            store.range = Some(block.changes.iter().fold(range, wider));
+        let taxels = self.sensor.array.len();
+        let has_extents = matches!(self.kept, Kept::All { .. }) && block.changes.len() >= taxels;
+        let stored = StoredBlock {
+            len: block.changes.len(),
+            range: range_of(&block.changes),
+            extents: if has_extents { extents(&block.changes, taxels) } else { vec![] },
+            has_extents,
+            place: None,
+            block,
+        };
+        if let Some((first, last)) = stored.range {
+            let (begin, end) = store.range.unwrap_or((first, last));
+            store.range = Some((begin.min(first), end.max(last)));
         }
-        let stored = StoredBlock { before: store.changes, len: block.changes.len(), in_file: false, block };
         store.changes += stored.len as u64;
         store.bytes += stored.bytes();
         match &self.kept {
@@ -167,10 +182,10 @@ impl Index {
     pub(crate) fn next(&self, number: &mut u64) -> Result<Option<Block>> {
         let store = self.store();
         let at = (*number).max(store.first);
-        let Some(StoredBlock { block, before, len, in_file }) = store.at(at) else { return Ok(None) };
+        let Some(StoredBlock { block, len, place, .. }) = store.at(at) else { return Ok(None) };
         let mut block = block.clone();
-        if let Some(file) = store.file.as_ref().filter(|_| *in_file) {
-            block.changes = Arc::new(file.read(*before, *len)?);
+        if let Some((file, begin)) = store.file.as_ref().zip(*place) {
+            block.changes = Arc::new(file.changes(begin, *len)?);
         }
         if let Some((_, key)) = store.keys.front().filter(|_| at > *number) {
             block.held = Some((key.held.clone(), key.events));
@@ -216,11 +231,42 @@ impl Index {
         }
     }
 
-    /// About how many changes there are between two times, us.
-    pub(crate) fn changes_between(&self, start: i64, stop: i64) -> u64 {
+    /// What a taxel held in columns of `column_us` us, from `since` (us) on or a little before, up to the block of this number. Only
+    /// blocks in which it changes and that several columns share are read: of others the extents say all.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the temporary file cannot be read.
+    pub(crate) fn history(&self, taxel: u32, column_us: i64, since: i64, until: u64) -> Result<TaxelHistory> {
+        let Ok((from, mut next)) = self.open(since) else {
+            return Ok(TaxelHistory::new(taxel, UNKNOWN, None, column_us));
+        };
+        let mut history = TaxelHistory::new(taxel, from.held[taxel as usize], from.latest, column_us);
+        while next < until {
+            match self.extent(next, taxel as usize)? {
+                Some((_, [_, _, UNKNOWN])) => next += 1,
+                Some(((first, last), extent)) if column_of(first, column_us) == column_of(last, column_us) => {
+                    history.extend(first, extent);
+                    next += 1;
+                }
+                _ => match self.next(&mut next)? {
+                    Some(block) => history.push(&block.changes),
+                    None => break,
+                },
+            }
+        }
+        Ok(history)
+    }
+
+    /// First and last time of a block that has extents, us, and that of a taxel.
+    fn extent(&self, number: u64, taxel: usize) -> Result<Option<((i64, i64), Extent)>> {
         let store = self.store();
-        let before = |t| store.key(t).and_then(|(number, _)| store.at(*number)).map_or(0, |block| block.before);
-        before(stop).saturating_sub(before(start))
+        let Some(stored) = store.at(number).filter(|stored| stored.has_extents) else { return Ok(None) };
+        let extent = match store.file.as_ref().zip(stored.place) {
+            Some((file, begin)) => file.extent(begin, stored.len, taxel)?,
+            None => stored.extents[taxel],
+        };
+        Ok(stored.range.map(|range| (range, extent)))
     }
 
     /// Number of changes.
@@ -262,8 +308,29 @@ impl StoredBlock {
     fn bytes(&self) -> usize {
         let values =
             self.block.rest.as_ref().map_or(0, Vec::len) + self.block.held.as_ref().map_or(0, |(held, _)| held.len());
-        size_of::<Self>() + self.block.changes.len() * BYTES + values * size_of::<u16>()
+        size_of::<Self>() + self.in_memory() + values * size_of::<u16>()
     }
+
+    /// Memory that its changes and extents take.
+    fn in_memory(&self) -> usize {
+        self.block.changes.len() * BYTES + size_of_val(&*self.extents)
+    }
+}
+
+/// First and last time of changes, us.
+fn range_of(changes: &[TaxelChange]) -> Option<(i64, i64)> {
+    let times = || changes.iter().map(|change| change.t);
+    times().min().zip(times().max())
+}
+
+/// The extent of each taxel among changes.
+fn extents(changes: &[TaxelChange], taxels: usize) -> Vec<Extent> {
+    let mut all = vec![[u16::MAX, 0, UNKNOWN]; taxels];
+    for &TaxelChange { taxel, ticks, .. } in changes.iter().filter(|change| change.ticks != UNKNOWN) {
+        let [least, greatest, last] = &mut all[taxel as usize];
+        (*least, *greatest, *last) = (ticks.min(*least), ticks.max(*greatest), ticks);
+    }
+    all
 }
 
 impl Store {
@@ -286,11 +353,11 @@ impl Store {
 
     /// Moves the changes that are in memory to the file.
     fn write(&mut self, mut file: ChangeFile) -> Result<()> {
-        let from = self.blocks.partition_point(|stored| stored.in_file);
+        let from = self.blocks.partition_point(|stored| stored.place.is_some());
         for stored in self.blocks.range_mut(from..) {
-            file.push(&std::mem::take(&mut stored.block.changes))?;
-            stored.in_file = true;
-            self.bytes -= stored.len * BYTES;
+            self.bytes -= stored.in_memory();
+            let (changes, extents) = (std::mem::take(&mut stored.block.changes), std::mem::take(&mut stored.extents));
+            stored.place = Some(file.push(&changes, &extents)?);
         }
         self.file = Some(file);
         Ok(())

@@ -9,10 +9,7 @@ use crate::block::Block;
 use crate::columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use crate::history::TaxelHistory;
 use crate::index::Index;
-use crate::state::{ArrayState, FORGET, Keyframe};
-
-/// Maximum number of changes that are decoded only for the history of a taxel.
-const HISTORY_CHANGES: u64 = 2_000_000;
+use crate::state::{ArrayState, FORGET};
 
 /// What a view shows of a source.
 #[derive(Debug, Clone)]
@@ -32,12 +29,6 @@ impl ViewOptions {
     /// Whether the columns are narrower than those that are stored of a whole source.
     pub fn is_narrow(&self) -> bool {
         self.column_us < COLUMN_US
-    }
-
-    /// The history of the watched taxel, which begins with what the array held before the changes that follow.
-    pub(crate) fn history(&self, from: &Keyframe) -> Option<TaxelHistory> {
-        let begin = |taxel| TaxelHistory::new(taxel, from.held[taxel as usize], from.latest, self.column_us);
-        self.watched.map(begin)
     }
 }
 
@@ -68,17 +59,15 @@ impl Player {
         let t = t.clamp(first, last);
         let whole = whole.or(index.whole.as_ref()).filter(|_| !options.is_narrow());
         let (unit_us, span) = (options.column_us.min(COLUMN_US), SPAN * options.column_us);
-        let decodes =
-            whole.is_none() || options.watched.is_some() && index.changes_between(t - span, t) <= HISTORY_CHANGES;
-        let before = if decodes { span } else { 0 };
-        let (from, next) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
+        let since = |us: i64| t.saturating_sub(us.max(FORGET * COLUMN_US) + LATE_US);
+        let (from, next) = index.open(since(if whole.is_none() { span } else { 0 }))?;
         let mut state = ArrayState::new(&index.sensor, &from, unit_us, span / unit_us);
         if let (Some(whole), Some(latest)) = (whole, from.latest) {
             state = state.after(Arc::clone(whole), column_of(latest + LATE_US, unit_us));
         }
-        let history = options.history(&from);
-        let mut player =
-            Self { index: Arc::clone(index), state, history, block: Block::default(), applied: 0, next, t };
+        let history = options.watched.map(|taxel| index.history(taxel, options.column_us, since(span), next));
+        let (history, block) = (history.transpose()?, Block::default());
+        let mut player = Self { index: Arc::clone(index), state, history, block, applied: 0, next, t };
         player.advance(t)?;
         Ok(player)
     }

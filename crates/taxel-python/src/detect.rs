@@ -10,7 +10,7 @@ use taxel_core::detect::{
 use taxel_core::encode::{Quantity, Tare, Zeroing};
 use taxel_core::spikes::us;
 
-use taxel_border::convert::{ArrayParts, Column, EventsIn, FramesIn, array, column, slice, to_array};
+use taxel_border::convert::{ArrayIn, Column, EventsIn, FramesIn, array, column, slice};
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::{ProblemError, core};
 use taxel_border::parameters::{Plain, parsed};
@@ -232,8 +232,8 @@ pub struct ReadoutStream(Exclusive<CoreStream>);
 #[pymethods]
 impl ReadoutStream {
     #[new]
-    fn new(readout: &str, array: ArrayParts, frame_us: f64, wire_version: u8, tare: Option<&str>) -> PyResult<Self> {
-        let ((readout, tare), array) = (parse(readout, tare)?, to_array(array)?);
+    fn new(readout: &str, array: ArrayIn, frame_us: f64, wire_version: u8, tare: Option<&str>) -> PyResult<Self> {
+        let ((readout, tare), array) = (parse(readout, tare)?, array.0);
         let frames = FrameTime::on_wire(frame_us, wire_version);
         Ok(Self(Exclusive::new(readout.stream(&array, frames, tare.as_ref()).map_err(core)?)))
     }

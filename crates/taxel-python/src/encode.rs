@@ -6,7 +6,7 @@ use taxel_core::encode::{Encoder, LocalLoad, Pieces, Tare};
 
 use taxel_core::problem;
 
-use taxel_border::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array};
+use taxel_border::convert::{ArrayIn, EventsIn, FramesIn, SpikesOut, from_spikes};
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::core;
 
@@ -24,9 +24,9 @@ pub fn encoder_names() -> Vec<&'static str> {
 
 /// Trains for an array, their kind, and the latency in ms.
 #[pyfunction]
-pub fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, &'static str, f64)> {
-    let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
-    Ok((encoder.trains(&array), encoder.kind().name(), encoder.latency_ms()))
+pub fn encoder_about(encoder: &str, array: ArrayIn) -> PyResult<(usize, &'static str, f64)> {
+    let encoder = Encoder::from_json(encoder).map_err(core)?;
+    Ok((encoder.trains(&array.0), encoder.kind().name(), encoder.latency_ms()))
 }
 
 /// The parameters of a local load.
@@ -92,9 +92,9 @@ pub struct EncoderStream(Exclusive<Pieces>);
 #[pymethods]
 impl EncoderStream {
     #[new]
-    fn new(encoder: &str, array: ArrayParts) -> PyResult<Self> {
-        let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
-        Ok(Self(Exclusive::new(Pieces::new(&encoder, array).map_err(core)?)))
+    fn new(encoder: &str, array: ArrayIn) -> PyResult<Self> {
+        let encoder = Encoder::from_json(encoder).map_err(core)?;
+        Ok(Self(Exclusive::new(Pieces::new(&encoder, array.0).map_err(core)?)))
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {

@@ -7,7 +7,7 @@ use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
 use taxel_core::rest::{Rest, TrackedRest, Value, preload as preload_of, preload_text, touched_from};
 use taxel_core::{Error, problem};
 
-use taxel_border::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
+use taxel_border::convert::{ArrayIn, EventsIn, EventsOut, FramesIn, array, from_events, slice};
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::core;
 
@@ -68,9 +68,9 @@ pub fn held_as_events<'py>(
     py: Python<'py>,
     held: PyReadonlyArray1<'py, u16>,
     t: i64,
-    sensor: ArrayParts,
+    sensor: ArrayIn,
 ) -> PyResult<EventsOut<'py>> {
-    Ok(from_events(py, as_events(slice("held", &held)?, t, &to_array(sensor)?)))
+    Ok(from_events(py, as_events(slice("held", &held)?, t, &sensor.0)))
 }
 
 /// What frames, one after the other in `values`, read above the rest of each taxel, infinite where that is unknown.

@@ -6,35 +6,30 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::metrics::{Metric, NAMES, Patterns, Work, matching};
 
-use taxel_border::convert::{array, slice};
+use taxel_border::convert::{self, array, slice};
 use taxel_border::enter::{enter, enter_with_progress};
 use taxel_border::errors::core;
 
-/// Patterns as Python hands them over: name, count, trains, times, offsets, listed.
-type PatternsIn<'py> = (String, usize, usize, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, bool);
-
-/// Patterns with their offsets as the core wants them.
-struct OffsetPatterns<'py> {
-    parts: PatternsIn<'py>,
+/// `Patterns` of Python.
+#[derive(FromPyObject)]
+pub struct PatternsIn<'py> {
+    name: String,
+    patterns: usize,
+    trains: usize,
+    times: PyReadonlyArray1<'py, f64>,
+    #[pyo3(from_py_with = to_offsets)]
     offsets: Vec<usize>,
+    listed: bool,
 }
 
-impl<'py> OffsetPatterns<'py> {
-    fn new(parts: PatternsIn<'py>) -> PyResult<Self> {
-        let offsets = slice("offsets", &parts.4)?.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
-        Ok(Self { parts, offsets })
-    }
+fn to_offsets(offsets: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+    convert::to_offsets(&offsets.extract()?)
+}
 
-    fn patterns(&self) -> PyResult<Patterns<'_>> {
-        let (name, count, trains, times, _, listed) = &self.parts;
-        Ok(Patterns {
-            name,
-            count: *count,
-            trains: *trains,
-            times: slice("times", times)?,
-            offsets: &self.offsets,
-            listed: *listed,
-        })
+impl PatternsIn<'_> {
+    fn view(&self) -> PyResult<Patterns<'_>> {
+        let Self { name, patterns: count, trains, times, offsets, listed } = self;
+        Ok(Patterns { name, count: *count, trains: *trains, times: slice("times", times)?, offsets, listed: *listed })
     }
 }
 
@@ -71,8 +66,7 @@ pub fn metric_names() -> Vec<&'static str> {
 /// The distance of two patterns.
 #[pyfunction]
 pub fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsIn<'py>) -> PyResult<f64> {
-    let (metric, a, b) = (to_metric(metric)?, OffsetPatterns::new(a)?, OffsetPatterns::new(b)?);
-    let (a, b) = (a.patterns()?, b.patterns()?);
+    let (metric, a, b) = (to_metric(metric)?, a.view()?, b.view()?);
     enter(py, |stop| metric.distance(&a, &b, stop))
 }
 
@@ -86,8 +80,7 @@ pub fn pairwise<'py>(
     threads: Option<NonZero<usize>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (metric, a, b) = (to_metric(metric)?, OffsetPatterns::new(a)?, b.map(OffsetPatterns::new).transpose()?);
-    let (a, b) = (a.patterns()?, b.as_ref().map(OffsetPatterns::patterns).transpose()?);
+    let (metric, a, b) = (to_metric(metric)?, a.view()?, b.as_ref().map(PatternsIn::view).transpose()?);
     let distances = enter_with_progress(py, |stop, caller| {
         let mut report = |done: usize, all: usize| {
             caller.call(progress.as_ref(), |py, function| function.call1(py, (done, all)));

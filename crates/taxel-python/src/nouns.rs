@@ -2,18 +2,17 @@
 
 use pyo3::prelude::*;
 
-use taxel_core::{SpikeKind, spikes};
+use taxel_core::spikes;
 
-use taxel_border::convert::{EventsIn, SpikesIn, SpikesOut, SpikesParts, from_spikes, slice, to_offsets};
+use taxel_border::convert::{EventsIn, SpikesColumns, SpikesIn, SpikesOut, from_spikes};
 use taxel_border::enter::enter;
 
 /// Checks spike trains; raises where train or spike make no sense.
 #[pyfunction]
-pub fn check_spikes(py: Python<'_>, trains: SpikesParts<'_>) -> PyResult<()> {
-    let (times, offsets, values, kind, start, stop) = trains;
-    let (times, offsets) = (slice("times", &times)?, to_offsets(&offsets)?);
-    let values = values.as_ref().map(|v| slice("values", v)).transpose()?;
-    enter(py, |_| spikes::check(times, &offsets, (SpikeKind::named(&kind)?, values), start, stop))
+pub fn check_spikes(py: Python<'_>, trains: SpikesColumns<'_>) -> PyResult<()> {
+    trains.read(|times, offsets, values, (start, stop)| {
+        enter(py, |_| spikes::check(times, &offsets, values, start, stop))
+    })
 }
 
 /// Checks events; raises where a column is short or an event lies outside its array.

@@ -8,6 +8,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::{Value, json};
+use taxel_core::Array;
 use taxel_core::rest::Value as _;
 use taxel_core::wire::Registers;
 use taxel_live::clock::BoardClock;
@@ -18,7 +19,7 @@ use taxel_panel::{FrameRest, FrameSource, FramesOfSource, Index, Kept, LiveSourc
 use crate::held::{TouchesOut, from_touches};
 use crate::live::Live;
 use crate::recording::{RecordingReader, Remarks};
-use taxel_border::convert::{ArrayParts, EventsIn, array, from_array, slice, to_array};
+use taxel_border::convert::{ArrayIn, EventsIn, array, slice};
 use taxel_border::enter::enter;
 use taxel_border::errors::ProblemError;
 use taxel_border::parameters::{Plain, parsed};
@@ -26,13 +27,13 @@ use taxel_border::parameters::{Plain, parsed};
 /// Counts by which unhealthy taxels are found: the sensor, the events of each taxel, those in the direction of the one before,
 /// touches, and the greatest value that it held.
 type ActivityOut<'py> =
-    (ArrayParts, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, TouchesOut<'py>, Bound<'py, PyArray1<u16>>);
+    (Plain<Array>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, TouchesOut<'py>, Bound<'py, PyArray1<u16>>);
 
 fn activity_of<'py>(py: Python<'py>, index: &Index) -> PyResult<ActivityOut<'py>> {
     let activity = enter(py, |_| index.activity())?;
     let touches = from_touches(py, &activity.touches);
     let (events, moved) = (array(py, activity.events), array(py, activity.moved));
-    Ok((from_array(&index.sensor.array), events, moved, touches, array(py, activity.greatest)))
+    Ok((Plain(index.sensor.array.clone()), events, moved, touches, array(py, activity.greatest)))
 }
 
 /// What every panel says at first.
@@ -188,8 +189,8 @@ impl PanelRecording {
     }
 
     /// The sensor.
-    fn array(&self) -> ArrayParts {
-        from_array(&self.0.sensor.array)
+    fn array(&self) -> Plain<Array> {
+        Plain(self.0.sensor.array.clone())
     }
 
     /// Counts by which unhealthy taxels are found; None of frames.
@@ -331,7 +332,7 @@ impl PanelView {
 struct ReadSource<'py> {
     name: String,
     left: u16,
-    array: ArrayParts,
+    array: ArrayIn,
     t: PyReadonlyArray1<'py, i64>,
     values: PyReadonlyArray1<'py, f32>,
     rest_source: String,
@@ -345,19 +346,18 @@ struct ReadSource<'py> {
 /// `ReadFrames` of Python.
 #[derive(FromPyObject)]
 struct ReadFrames<'py> {
-    array: ArrayParts,
+    array: ArrayIn,
     sources: Vec<ReadSource<'py>>,
     unit: String,
     number_us: Option<i64>,
 }
 
 fn to_index(py: Python<'_>, frames: ReadFrames<'_>, kept: Kept) -> PyResult<Index> {
-    let ReadFrames { array, sources, unit, number_us } = frames;
-    let array = to_array(array)?;
+    let ReadFrames { array: ArrayIn(array), sources, unit, number_us } = frames;
     let mut placed = vec![];
     let values: Vec<PyReadonlyArray1<'_, f32>> = sources.iter().map(|source| source.values.clone()).collect();
     for (read, values) in sources.into_iter().zip(&values) {
-        let (name, left, sensor) = (read.name, read.left, to_array(read.array)?);
+        let (name, left, sensor) = (read.name, read.left, read.array.0);
         let (t, values, rests) = (slice("t", &read.t)?, slice("values", values)?, slice("rest", &read.rest)?);
         let cells = sensor.len();
         let inside = left <= array.columns && sensor.columns <= array.columns - left && sensor.rows <= array.rows;

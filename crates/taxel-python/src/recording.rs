@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::PyDict;
 use serde_json::{Value, json};
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
@@ -25,8 +25,8 @@ use taxel_border::parameters::{Plain, parsed};
 /// The decoded datagrams of a board.
 #[pyclass(frozen, get_all)]
 pub struct DecodedDatagrams {
-    /// The parts of the events.
-    events: Py<PyTuple>,
+    /// The columns of the events.
+    events: Py<PyDict>,
     /// The decoder's counts.
     counts: Plain<Value>,
     /// The counts of the decoder of version 2.
@@ -48,8 +48,6 @@ struct Frames<'py> {
     values: Bound<'py, PyArray1<f32>>,
     /// Number of messages that are no frame of the array.
     bad: u64,
-    /// What a verdict takes from reading.
-    found: Plain<Value>,
 }
 
 /// What a recording holds beside its data.
@@ -135,9 +133,8 @@ impl RecordingReader {
 
     /// All frames of a source.
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Frames<'py>> {
-        let recording::Frames { t, at_ns, values, bad, found } = enter(py, |stop| self.reader.frames(stop))?;
-        let (t, at_ns, values) = (array(py, t), array(py, at_ns), array(py, values));
-        Ok(Frames { t, at_ns, values, bad, found: Plain(json!(found)) })
+        let recording::Frames { t, at_ns, values, bad } = enter(py, |stop| self.reader.frames(stop))?;
+        Ok(Frames { t: array(py, t), at_ns: array(py, at_ns), values: array(py, values), bad })
     }
 
     /// The header, how the recording ended, and what was rebuilt on opening.

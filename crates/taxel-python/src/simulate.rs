@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::PyDict;
 use serde::Deserialize;
 use taxel_core::board::{self, Board, Crossed, Flaws, IntensityWord, NetworkFaults, Play, Previous, Version2, opening};
 use taxel_core::circuit::Chain;
@@ -13,7 +13,7 @@ use taxel_core::{Error, Result, Stop, reading};
 use taxel_live::address::of_text;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Replay, Report, Scenes, Touch};
 
-use taxel_border::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
+use taxel_border::convert::{ArrayIn, Column, EventsIn, array, column, from_events, slice};
 use taxel_border::enter::{Exclusive, enter, enter_with_progress};
 use taxel_border::errors::core;
 use taxel_border::parameters::{Plain, parsed};
@@ -69,23 +69,21 @@ fn from_narrow(narrow: &[(usize, Narrow)]) -> NarrowOut {
 
 /// Draws a scene; gives its parameters.
 #[pyfunction]
-pub fn draw_scene(parts: ArrayParts, seed: u64, index: u32, left_to_rest: bool) -> PyResult<Plain<Scene>> {
-    Scene::draw(&to_array(parts)?, seed, index, left_to_rest).map(Plain).map_err(core)
+pub fn draw_scene(felt: ArrayIn, seed: u64, index: u32, left_to_rest: bool) -> PyResult<Plain<Scene>> {
+    Scene::draw(&felt.0, seed, index, left_to_rest).map(Plain).map_err(core)
 }
 
 /// Refuses a scene or taxels that make no sense on an array, without computing the scene.
 #[pyfunction]
-pub fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
-    let felt = to_array(parts)?;
-    scene(json).and_then(|scene| scene.check(&felt)).map_err(core)?;
+pub fn check_scene(felt: ArrayIn, json: &str, sensor: &str) -> PyResult<()> {
+    scene(json).and_then(|scene| scene.check(&felt.0)).map_err(core)?;
     to_sensor(sensor)?.check().map_err(core)
 }
 
 /// Works a scene out: each body's trajectory at even steps, and the touches.
 #[pyfunction]
-pub fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
-    let felt = to_array(parts)?;
-    let motion = enter(py, |stop| Motion::compute(&scene(json)?, &felt, step_us, stop))?;
+pub fn motion<'py>(py: Python<'py>, felt: ArrayIn, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
+    let motion = enter(py, |stop| Motion::compute(&scene(json)?, &felt.0, step_us, stop))?;
     let (contacts, narrow) = (Plain(motion.contacts), motion.narrow.map(|narrow| narrow.to_string()));
     let out = |Track { x_mm, y_mm, depth_mm, force_n }: Track| TrackOut {
         x_mm: array(py, x_mm),
@@ -100,15 +98,14 @@ pub fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64)
 #[pyfunction]
 pub fn truth<'py>(
     py: Python<'py>,
-    parts: ArrayParts,
+    felt: ArrayIn,
     registers: &str,
     acts: Vec<ActIn<'py>>,
 ) -> PyResult<(Plain<Vec<Contact>>, Column<f32>, NarrowOut)> {
     let registers = parsed("registers", registers)?;
-    let (array_felt, sensor) = (to_array(parts)?, Sensor::default());
-    let (circuit, asynchronous, tare_ms) = (None, false, 0.0);
+    let (sensor, circuit, asynchronous, tare_ms) = (Sensor::default(), None, false, 0.0);
     let acts = to_acts(acts)?;
-    let play = Play { array: array_felt, registers, sensor, seed: 0, acts, tare_ms, circuit, asynchronous };
+    let play = Play { array: felt.0, registers, sensor, seed: 0, acts, tare_ms, circuit, asynchronous };
     let (stage, force_n) = enter(py, |stop| {
         let stage = play.stage(stop)?;
         let force_n = stage.force_n()?;
@@ -128,8 +125,8 @@ struct PlayedBy {
 /// What a host decodes of the datagrams of a board that was played to.
 #[pyclass(frozen, get_all, module = "taxel._core")]
 pub struct Played {
-    /// The parts of the events.
-    events: Py<PyTuple>,
+    /// The columns of the events.
+    events: Py<PyDict>,
     /// How many datagrams there were, with their words and bytes.
     datagrams: u64,
     words: u64,
@@ -143,7 +140,7 @@ pub struct Played {
 #[pyfunction]
 pub fn play(
     py: Python<'_>,
-    parts: ArrayParts,
+    felt: ArrayIn,
     registers: &str,
     sensor: &str,
     seed: u64,
@@ -152,9 +149,9 @@ pub fn play(
     options: &str,
     watch: Py<PyAny>,
 ) -> PyResult<Played> {
-    let (array, registers, sensor) = (to_array(parts)?, parsed("registers", registers)?, to_sensor(sensor)?);
+    let (registers, sensor) = (parsed("registers", registers)?, to_sensor(sensor)?);
     let PlayedBy { circuit, asynchronous } = parsed("options", options)?;
-    let play = Play { array, registers, sensor, seed, acts: to_acts(acts)?, tare_ms, circuit, asynchronous };
+    let play = Play { array: felt.0, registers, sensor, seed, acts: to_acts(acts)?, tare_ms, circuit, asynchronous };
     let board::Played { events, datagrams, words, bytes, narrow } = enter_with_progress(py, |stop, caller| {
         play.run(|share| caller.call(Some(&watch), |py, function| function.call1(py, (share,))), stop)
     })?;
@@ -244,7 +241,7 @@ impl Touch for Felt {
 pub fn emulate(
     py: Python<'_>,
     to: &str,
-    parts: ArrayParts,
+    felt: ArrayIn,
     sensor: &str,
     seed: u64,
     touch: TouchIn<'_>,
@@ -252,7 +249,7 @@ pub fn emulate(
     begun: Py<PyAny>,
     watch: Py<PyAny>,
 ) -> PyResult<Plain<Report>> {
-    let array = to_array(parts)?;
+    let array = felt.0;
     let chosen: EmulationOptions = parsed("options", options)?;
     let EmulationOptions { registers, tare_ms, version_2, previous, intensity, .. } = chosen;
     let (frame_us, step) = (registers.frame_us(), u16::from(registers.noise_floor) + 1);
@@ -321,11 +318,10 @@ pub struct Layer(Exclusive<Bonded>);
 impl Layer {
     /// `foam` is JSON.
     #[new]
-    fn new(py: Python<'_>, parts: ArrayParts, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
+    fn new(py: Python<'_>, felt: ArrayIn, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
         let foam: Foam = reading::from_text(foam).map_err(|unfit| core(unfit.scene("foam")))?;
-        let array = to_array(parts)?;
         let layer =
-            enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;
+            enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &felt.0, cells_per_pitch, stop)?.to_within(tolerance)))?;
         Ok(Self(Exclusive::new(layer)))
     }
 
@@ -370,14 +366,13 @@ impl Layer {
 #[pyfunction]
 pub fn pattern_values<'py>(
     py: Python<'py>,
-    parts: ArrayParts,
+    felt: ArrayIn,
     x: PyReadonlyArray1<'py, u16>,
     y: PyReadonlyArray1<'py, u16>,
     frame: PyReadonlyArray1<'py, u16>,
     ramp: u16,
 ) -> PyResult<Bound<'py, PyArray1<u16>>> {
-    let layout = to_array(parts)?;
     let (x, y, frame) = (slice("x", &x)?, slice("y", &y)?, slice("frame", &frame)?);
-    let values = x.iter().zip(y).zip(frame).map(|((&x, &y), &n)| board::pattern(&layout, (x, y), n, ramp));
+    let values = x.iter().zip(y).zip(frame).map(|((&x, &y), &n)| board::pattern(&felt.0, (x, y), n, ramp));
     Ok(array(py, values.collect()))
 }

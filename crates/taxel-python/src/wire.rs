@@ -14,8 +14,7 @@ use taxel_core::wire::{self, Command, CutDatagrams, Decoder, Registers};
 use taxel_core::{Error, Events, problem};
 
 use taxel_border::convert::{
-    ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_columns, from_events, slice, to_array,
-    to_columns,
+    ArrayIn, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_columns, from_events, slice, to_columns,
 };
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::core;
@@ -35,11 +34,10 @@ pub struct WireDecoder(Exclusive<VersionedDecoder>);
 impl WireDecoder {
     /// `differences` is of version 1 alone: datagrams of version 2 state it themselves.
     #[new]
-    fn new(version: u8, array: ArrayParts, differences: bool) -> PyResult<Self> {
-        let array = to_array(array)?;
+    fn new(version: u8, array: ArrayIn, differences: bool) -> PyResult<Self> {
         Ok(Self(Exclusive::new(match version {
-            1 => VersionedDecoder::One(Box::new(Decoder::new(array).differences(differences))),
-            _ => VersionedDecoder::Two(Box::new(v2::Decoder::new(array)), None),
+            1 => VersionedDecoder::One(Box::new(Decoder::new(array.0).differences(differences))),
+            _ => VersionedDecoder::Two(Box::new(v2::Decoder::new(array.0)), None),
         })))
     }
 
@@ -208,33 +206,32 @@ pub fn registers_fields() -> Plain<&'static [wire::registers::Field]> {
 /// A preset: as it is written, or on a board of an array.
 #[pyfunction]
 #[pyo3(signature = (name, array = None))]
-pub fn registers_preset(name: &str, array: Option<ArrayParts>) -> PyResult<Plain<Registers>> {
+pub fn registers_preset(name: &str, array: Option<ArrayIn>) -> PyResult<Plain<Registers>> {
     let preset = match array {
         None => Registers::preset(name),
-        Some(array) => Registers::preset_on(name, &to_array(array)?),
+        Some(array) => Registers::preset_on(name, &array.0),
     };
     Ok(Plain(preset.map_err(core)?))
 }
 
 /// What a board of an array that holds these registers holds after a preset.
 #[pyfunction]
-pub fn registers_with_preset(registers: &str, name: &str, array: ArrayParts) -> PyResult<Plain<Registers>> {
+pub fn registers_with_preset(registers: &str, name: &str, array: ArrayIn) -> PyResult<Plain<Registers>> {
     let held: Registers = parsed("registers", registers)?;
-    let array = to_array(array)?;
-    let preset = Registers::preset_on(name, &array).map_err(core)?;
-    Ok(Plain(held.with_preset(&preset, &array)))
+    let preset = Registers::preset_on(name, &array.0).map_err(core)?;
+    Ok(Plain(held.with_preset(&preset, &array.0)))
 }
 
 /// What a board of an array and so many channels holds at reset.
 #[pyfunction]
-pub fn registers_at_reset(array: ArrayParts, channels: u8) -> PyResult<Plain<Registers>> {
-    Ok(Plain(Registers::at_reset(&to_array(array)?, channels)))
+pub fn registers_at_reset(array: ArrayIn, channels: u8) -> PyResult<Plain<Registers>> {
+    Ok(Plain(Registers::at_reset(&array.0, channels)))
 }
 
 /// What a board holds that scans another sensor's frames, and by how many bits values are shifted down.
 #[pyfunction]
-pub fn registers_of_source(array: ArrayParts, rate_hz: f64, bits: u32) -> PyResult<(Plain<Registers>, u32)> {
-    let (registers, shift) = Registers::of_source(&to_array(array)?, rate_hz, bits).map_err(core)?;
+pub fn registers_of_source(array: ArrayIn, rate_hz: f64, bits: u32) -> PyResult<(Plain<Registers>, u32)> {
+    let (registers, shift) = Registers::of_source(&array.0, rate_hz, bits).map_err(core)?;
     Ok((Plain(registers), shift))
 }
 
@@ -242,17 +239,17 @@ pub fn registers_of_source(array: ArrayParts, rate_hz: f64, bits: u32) -> PyResu
 ///
 /// All are set before the rules are checked, so that their order does not matter.
 #[pyfunction]
-pub fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayParts) -> PyResult<Plain<Registers>> {
+pub fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayIn) -> PyResult<Plain<Registers>> {
     let mut registers: Registers = parsed("registers", registers)?;
-    registers.set_all(&fields, &to_array(array)?).map_err(core)?;
+    registers.set_all(&fields, &array.0).map_err(core)?;
     Ok(Plain(registers))
 }
 
 /// The registers that a file holds: values fit their fields and the array, whatever the other rules say.
 #[pyfunction]
-pub fn registers_of_file(registers: &str, array: ArrayParts) -> PyResult<Plain<Registers>> {
+pub fn registers_of_file(registers: &str, array: ArrayIn) -> PyResult<Plain<Registers>> {
     let registers: Registers = parsed("registers", registers)?;
-    registers.check_fit(&to_array(array)?).map_err(core)?;
+    registers.check_fit(&array.0).map_err(core)?;
     Ok(Plain(registers))
 }
 
@@ -277,9 +274,9 @@ pub fn registers_of_words(words: [u32; 8], channels: u8) -> Plain<Registers> {
 
 /// The writes that lead from one set to another.
 #[pyfunction]
-pub fn registers_commands(source: &str, target: &str, array: ArrayParts) -> PyResult<Vec<(u8, u32)>> {
+pub fn registers_commands(source: &str, target: &str, array: ArrayIn) -> PyResult<Vec<(u8, u32)>> {
     let (from, to): (Registers, Registers) = (parsed("registers", source)?, parsed("registers", target)?);
-    let commands = from.commands_to(&to, &to_array(array)?).map_err(core)?;
+    let commands = from.commands_to(&to, &array.0).map_err(core)?;
     Ok(commands.into_iter().map(|c| (c.register, c.value)).collect())
 }
 
@@ -303,8 +300,8 @@ pub struct WireBoard(Exclusive<(Board, Option<Crossed>)>);
 impl WireBoard {
     /// `registers` and `options` are JSON.
     #[new]
-    fn new(registers: &str, array: ArrayParts, options: &str) -> PyResult<Self> {
-        let (registers, array): (Registers, _) = (parsed("registers", registers)?, to_array(array)?);
+    fn new(registers: &str, array: ArrayIn, options: &str) -> PyResult<Self> {
+        let (registers, array): (Registers, _) = (parsed("registers", registers)?, array.0);
         let WireBoardOptions { previous, intensity, queue, version_2, circuit, asynchronous } =
             parsed("options", options)?;
         let mut board = Board::new(registers, &array).map_err(core)?;

@@ -6,9 +6,7 @@ use pyo3::types::PyBytes;
 use taxel_core::Error;
 use taxel_core::wire::v2::{self, StreamReader};
 
-use taxel_border::convert::{
-    ArrayParts, Column, ColumnsIn, EventsIn, FilledOut, column, from_columns, slice, to_array, to_columns,
-};
+use taxel_border::convert::{ArrayIn, Column, ColumnsIn, EventsIn, FilledOut, column, from_columns, slice, to_columns};
 use taxel_border::enter::{Exclusive, enter};
 
 /// Decodes a whole stream of datagrams, each behind its length, into columns.
@@ -16,11 +14,11 @@ use taxel_border::enter::{Exclusive, enter};
 pub fn decode_datagrams<'py>(
     py: Python<'py>,
     data: PyReadonlyArray1<'_, u8>,
-    sensor: ArrayParts,
+    sensor: ArrayIn,
     mut columns: ColumnsIn<'_>,
 ) -> PyResult<FilledOut<'py>> {
-    let (bytes, sensor, mut columns) = (slice("data", &data)?, to_array(sensor)?, to_columns(&mut columns)?);
-    enter(py, |stop| v2::decode(bytes, sensor, &mut columns, stop))?;
+    let (bytes, mut columns) = (slice("data", &data)?, to_columns(&mut columns)?);
+    enter(py, |stop| v2::decode(bytes, sensor.0, &mut columns, stop))?;
     Ok(from_columns(py, &columns))
 }
 

@@ -201,7 +201,7 @@ class ReadoutStream:
 
     def _begin(self, array: Array) -> _core.ReadoutStream:
         if self._core is None:
-            parts = instance("array", array, Array)._parts()
+            parts = instance("array", array, Array)
             self._core = _core.ReadoutStream(
                 self._detector._for(None, self._rest).to_json(), parts, self._frame_us, self._version, self._tare
             )
@@ -229,9 +229,9 @@ class ReadoutStream:
         if isinstance(x, Events | Frames):
             self._detector._check_unit(unit_of(x))
         if isinstance(x, Events):
-            return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
+            return Detections._from_parts(self._begin(x.array).push_events(x))
         if isinstance(x, Frames):
-            return Detections._from_parts(self._begin(x.array).push_frames(x._parts()))
+            return Detections._from_parts(self._begin(x.array).push_frames(x))
         raise refused("x", f" is {shown(x)}: must be a taxel.Events or taxel.Frames")
 
     def advance(self, t_us: int) -> Detections:

@@ -295,6 +295,6 @@ def _curves(
     """Return quantities over an example, each a curve."""
     source, tare, how = example.source, tare_text(example.tare), (list(quantities), list(levels), noise_floor)
     if isinstance(source, Frames):
-        return _core.LoadCurve.of_frames(*how, source._parts(), frame_us, tare)
+        return _core.LoadCurve.of_frames(*how, source, frame_us, tare)
     period = FRAME_US if frame_us is None else frame_us
-    return _core.LoadCurve.of_events(*how, source._parts(), period, wire_version, tare)  # type: ignore[union-attr]
+    return _core.LoadCurve.of_events(*how, source, period, wire_version, tare)  # type: ignore[arg-type]

@@ -467,13 +467,13 @@ def run(
                 array._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
-        columns = _core.readout_run_events(text, source._parts(), period, version, given, zeroings, begin_us)
+        columns = _core.readout_run_events(text, source, period, version, given, zeroings, begin_us)
         return Detections._from_parts(columns)
     if not isinstance(source, Frames):
         raise refused(
             "source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
-    return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, given, zeroings, begin_us))
+    return Detections._from_parts(_core.readout_run_frames(text, source, period, given, zeroings, begin_us))
 
 
 def _receives(encoder: Encoder, trained: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:

@@ -122,12 +122,12 @@ class Encoder(Value):
         >>> LevelCrossing([5.0, 10.0]).trains(Array(4, 4))
         32
         """
-        return _core.encoder_about(self._json(), instance("array", array, Array)._parts())[0]
+        return _core.encoder_about(self._json(), instance("array", array, Array))[0]
 
     @property
     def kind(self) -> Kind:
         """The meaning of its spikes' values, as in `SpikeTrains`: "unsigned", "signed" or "graded"."""
-        return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]  # type: ignore[return-value]
+        return _core.encoder_about(self._json(), Array(1, 1))[1]  # type: ignore[return-value]
 
     @property
     def signed(self) -> bool:
@@ -137,7 +137,7 @@ class Encoder(Value):
     @property
     def latency_ms(self) -> float:
         """The delay between touch and spike that the encoder's rule causes, ms."""
-        return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
+        return _core.encoder_about(self._json(), Array(1, 1))[2]
 
     def with_tare(self, tare: Tare) -> Self:
         """Return the same encoder with this tare; an encoder or part without the parameter `tare` is unchanged.
@@ -196,8 +196,8 @@ class Encoder(Value):
         """
         x = recorded(x)
         if isinstance(x, Events):
-            return SpikeTrains._from_parts(_core.encode_events(self._json(), x._parts()))
-        return SpikeTrains._from_parts(_core.encode_frames(self._json(), frames_of(x)._parts()))
+            return SpikeTrains._of_own(**_core.encode_events(self._json(), x))
+        return SpikeTrains._of_own(**_core.encode_frames(self._json(), frames_of(x)))
 
     def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
         """Return the encoder itself, which learns nothing; a scikit-learn pipeline calls `fit` of each step.
@@ -297,7 +297,7 @@ class EncoderStream:
 
     def _begin(self, array: Array) -> _core.EncoderStream:
         if self._core is None:
-            self._core = _core.EncoderStream(self._parameters, instance("array", array, Array)._parts())
+            self._core = _core.EncoderStream(self._parameters, instance("array", array, Array))
         return self._core
 
     @property
@@ -332,9 +332,9 @@ class EncoderStream:
         (array([], dtype=float64), array([1.]))
         """
         if isinstance(x, Events):
-            return SpikeTrains._from_parts(self._begin(x.array).push_events(x._parts()))
+            return SpikeTrains._of_own(**self._begin(x.array).push_events(x))
         frames = frames_of(x)
-        return SpikeTrains._from_parts(self._begin(frames.array).push_frames(frames._parts()))
+        return SpikeTrains._of_own(**self._begin(frames.array).push_frames(frames))
 
     def advance(self, t_us: int) -> SpikeTrains:
         """Advance the stream's time: after this call no event before `t_us` is pushed.
@@ -382,8 +382,8 @@ class EncoderStream:
         """
         return self._spikes(None if self._core is None else self._core.finish())
 
-    def _spikes(self, parts: tuple[Any, ...] | None) -> SpikeTrains:
-        return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._from_parts(parts)
+    def _spikes(self, parts: _core._Spikes | None) -> SpikeTrains:
+        return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._of_own(**parts)
 
 
 def frames_of(x: object) -> Frames:

@@ -150,7 +150,7 @@ class LocalLoad(Tared):
         """
         encoder, source = self._with_rest_of(recorded(x))
         if isinstance(source, Events):
-            values = _core.local_load_of_events(encoder._json(), source._parts())
+            values = _core.local_load_of_events(encoder._json(), source)
         else:
-            values = _core.local_load_of_frames(encoder._json(), frames_of(source)._parts())
+            values = _core.local_load_of_frames(encoder._json(), frames_of(source))
         return values.reshape(-1, len(self.quantities))

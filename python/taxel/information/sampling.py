@@ -51,7 +51,7 @@ class HeldValues:
             values = source.values.reshape(len(source), exists.size)
             self._values = values if exists.all() else values[:, self.taxels]
         else:
-            self._held = _core.HeldValues(source._parts(), self.taxels.astype(np.uint32), None)
+            self._held = _core.HeldValues(source, self.taxels.astype(np.uint32), None)
 
     def __reduce__(self) -> tuple[type[HeldValues], tuple[Events | Frames]]:
         """Pickle what it is made of, for other processes."""

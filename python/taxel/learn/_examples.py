@@ -14,11 +14,11 @@ from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
 
-def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
+def examples(patterns: object, targets: object) -> tuple[list[SpikeTrains], list[NDArray[float64]]]:
     """Return patterns and targets as the compiled part reads them; refuse other types."""
     if isinstance(patterns, SpikeTrains):
         raise refused("patterns", f" is one SpikeTrains ({patterns!r}): must be a list of them, one per pattern")
-    trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
+    trains = [instance(f"pattern {p}", s, SpikeTrains) for p, s in enumerate(several("patterns", patterns))]
     if not np.iterable(targets):
         raise refused(
             "targets", f" is {shown(targets)}: must be a list of times (ms) for each pattern, for example [[20.0], []]"

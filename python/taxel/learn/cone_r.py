@@ -283,10 +283,10 @@ class ConeRProblem:
         trains, times = examples(patterns, targets)
         each = [None] * len(trains) if silence is None else several("silence", silence)
         silences = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
-        self._trains = len(trains[0][1]) - 1 if trains else 0
+        self._trains = len(trains[0]) if trains else 0
         self._counted = _counted(instance("cone", cone, ConeR), trains)
         if self._counted is not None:
-            trains = [(parts[0], np.append(parts[1][self._counted], parts[1][-1]), *parts[2:]) for parts in trains]
+            trains = [_chosen(pattern, self._counted) for pattern in trains]
         _weighed("patterns", self._trains if self._counted is None else len(self._counted), "trains have spikes")
         self._problem = _core.ConeRProblem(self._handed(cone)[0], trains, times, silences)
         self.silent_rows: int = self._problem.silent_rows
@@ -387,16 +387,22 @@ def _weighed(name: str, count: int, trains: str) -> None:
         )
 
 
-def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:
+def _chosen(pattern: SpikeTrains, counted: NDArray[np.int64]) -> SpikeTrains:
+    """Return those trains of a pattern; the others have no spikes."""
+    offsets = np.append(pattern.offsets[counted], pattern.offsets[-1])
+    return SpikeTrains(pattern.times, offsets, pattern.start, pattern.stop, pattern.values, kind=pattern.kind)
+
+
+def _counted(cone: ConeR, trains: Sequence[SpikeTrains]) -> NDArray[np.int64] | None:
     """Return the trains with a spike in some pattern, or with bounds that exclude 0; None if these are all trains.
 
     The weight of any other train is 0 in every solution, and nearly all trains of a whole array are of this kind.
     """
-    if len({len(parts[1]) for parts in trains}) != 1:
+    if len({len(pattern) for pattern in trains}) != 1:
         return None
     cone._check()
     plain = cone._plain()
-    counted = np.logical_or.reduce([np.diff(parts[1]) > 0 for parts in trains])
+    counted = np.logical_or.reduce([pattern.counts > 0 for pattern in trains])
     low, high = (np.asarray(plain[name], np.float64) for name in ("lb", "ub"))
     if any(bound.ndim and len(bound) != len(counted) for bound in (low, high)):
         return None

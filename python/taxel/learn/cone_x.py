@@ -415,8 +415,8 @@ class ConeXProblem:
     """
 
     def __init__(self, cone: ConeX, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
-        parts, self.targets = examples(patterns, targets)
-        self._stated = instance("cone", cone, ConeX)._json(), parts
+        trains, self.targets = examples(patterns, targets)
+        self._stated = instance("cone", cone, ConeX)._json(), trains
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -432,8 +432,8 @@ class ConeXProblem:
 
     def _restated(self) -> tuple[ConeX, list[SpikeTrains]]:
         """Return the learner's parameters and the patterns that state the problem."""
-        json_text, parts = self._stated
-        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(part) for part in parts]
+        json_text, trains = self._stated
+        return ConeX._from_values(json.loads(json_text)), trains
 
     def __getstate__(self) -> dict[str, Any]:
         return {"_stated": self._stated, "targets": self.targets, "margin": self.margin}

@@ -187,7 +187,7 @@ class OnlineConeR(ConeR):
         return lock
 
     def _add(self, pattern: SpikeTrains, targets: ArrayLike, silence: Any, name: str, targets_name: str) -> None:
-        example = instance(name, pattern, SpikeTrains)._parts(), floats(targets_name, targets), silence
+        example = instance(name, pattern, SpikeTrains), floats(targets_name, targets), silence
         # A train that is silent in this window may have spikes in the next.
         _weighed(name, len(pattern), "trains")
         self._stream.add(*example)

@@ -141,7 +141,7 @@ class LiveOptions:
         if registers is None:
             registers = Registers(array=array)
         elif not isinstance(registers, Registers):
-            registers = Registers._of(_core.registers_preset(text("registers", registers), array._parts()), array)
+            registers = Registers._of(_core.registers_preset(text("registers", registers), array), array)
         if readout is not None and stated:
             readout = readout._with_floor(float(registers.noise_floor))
         return replace(self, array=array, registers=registers, readout=readout)

@@ -152,7 +152,7 @@ class StatedSource:
 
     def registers(self, array: Array) -> Registers:
         """Return the registers of a board."""
-        return Registers._of(_core.registers_preset(self.preset, array._parts()), array)
+        return Registers._of(_core.registers_preset(self.preset, array), array)
 
 
 def _is_port(text: str) -> bool:

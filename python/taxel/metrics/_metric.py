@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, instance, number, parameters, several, shown, text
@@ -18,6 +18,17 @@ from taxel.array import Array
 from taxel.spikes import SpikeTrains
 
 Pattern = ArrayLike | SpikeTrains
+
+
+class Patterns(NamedTuple):
+    """Several patterns of equally many trains, one behind the other; `listed`: an error names them by their number."""
+
+    name: str
+    patterns: int
+    trains: int
+    times: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+    listed: bool
 
 
 def stated(metric: str, options: Mapping[str, Any]) -> str:
@@ -45,25 +56,25 @@ def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) ->
     return _core.distance(stated(metric, options), _one(metric, "a", a), _one(metric, "b", b))
 
 
-def _one(metric: str, name: str, x: Pattern) -> tuple[Any, ...]:
+def _one(metric: str, name: str, x: Pattern) -> Patterns:
     if isinstance(x, SpikeTrains):
         trains = _unvalued(metric, x)
-        return name, 1, len(trains), trains.times, trains.offsets, False
+        return Patterns(name, 1, len(trains), trains.times, trains.offsets, False)
     times = floats(name, x)
-    return name, 1, 1, times, np.array([0, len(times)]), False
+    return Patterns(name, 1, 1, times, np.array([0, len(times)]), False)
 
 
-def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[Any, ...]:
+def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> Patterns:
     """Return several patterns: the trains of one `SpikeTrains`, a list of `SpikeTrains`, or a list of times a train."""
     if isinstance(x, SpikeTrains):
         if x.signed:
             raise refused(name, " has signed trains: choose some by split_by_sign(), or give a list of patterns")
         x._ungraded(metric)
-        return name, len(x), 1, x.times, x.offsets, True
+        return Patterns(name, len(x), 1, x.times, x.offsets, True)
     entries = several(name, x)
     if not any(isinstance(entry, SpikeTrains) for entry in entries):
         times = [floats(f"{name}[{p}]", entry) for p, entry in enumerate(entries)]
-        return name, len(times), 1, _joined(times), _offsets([len(t) for t in times]), True
+        return Patterns(name, len(times), 1, _joined(times), _offsets([len(t) for t in times]), True)
     patterns = [instance(f"{name}[{p}]", entry, SpikeTrains) for p, entry in enumerate(entries)]
     patterns = [_unvalued(metric, p) for p in patterns]
     trains = len(patterns[0])
@@ -73,7 +84,7 @@ def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[
                 name, f"[{p}] has {counted(len(pattern), 'train')}, {name}[0] has {trains}: must be equally many"
             )
     offsets = _offsets(np.concatenate([p.counts for p in patterns]))
-    return name, len(patterns), trains, _joined([p.times for p in patterns]), offsets, True
+    return Patterns(name, len(patterns), trains, _joined([p.times for p in patterns]), offsets, True)
 
 
 def _unvalued(metric: str, trains: SpikeTrains) -> SpikeTrains:

@@ -61,4 +61,4 @@ def pairwise(
     if progress is not None:
         callback("progress", progress)
     distances = _core.pairwise(stating, rows, columns, count, progress)
-    return distances.reshape(rows[1], (rows if columns is None else columns)[1])
+    return distances.reshape(rows.patterns, (columns or rows).patterns)

@@ -128,7 +128,7 @@ class Board:
             fields.append((name, int(value)))
         self._know()
         try:
-            self._write(_core.registers_with(json.dumps(self.registers), fields, array._parts()), array)
+            self._write(_core.registers_with(json.dumps(self.registers), fields, array), array)
         except (DeviceError, ProblemError) as error:
             if error.argument is None:
                 # A rule of several registers: the field is the one that its text names first.
@@ -140,7 +140,7 @@ class Board:
     def apply(self, preset: str, array: Array) -> None:
         """Write the registers of a preset."""
         self._know()
-        self._write(_core.registers_with_preset(json.dumps(self.registers), preset, array._parts()), array)
+        self._write(_core.registers_with_preset(json.dumps(self.registers), preset, array), array)
 
     def record(self, on: bool) -> None:
         """Write the register that marks a recording."""
@@ -160,7 +160,7 @@ class Board:
 
     def _write(self, target: dict[str, Any], array: Array) -> None:
         held = self.registers
-        commands = _core.registers_commands(json.dumps(held), json.dumps(target), array._parts())
+        commands = _core.registers_commands(json.dumps(held), json.dumps(target), array)
         try:
             with self._lock:
                 for register, value in commands:

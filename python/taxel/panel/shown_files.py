@@ -52,7 +52,7 @@ class ReadSource:
 
     name: str
     left: int
-    array: _core._Array
+    array: Array
     t: NDArray[np.int64]
     values: NDArray[np.float32]
     rest_source: str
@@ -76,7 +76,7 @@ class ReadFrames:
         Time from one frame to the next, us, where frames are numbered.
     """
 
-    array: _core._Array
+    array: Array
     sources: list[ReadSource]
     unit: str
     number_us: int | None
@@ -144,7 +144,7 @@ class Opening:
 def judged(activity: _core._Activity) -> dict[str, Any]:
     """Return the numbers of taxels and untested ones, and the dead, stuck and noisy ones."""
     array, events, moved, touches, greatest = activity
-    sensor = Array._from_parts(array)
+    sensor = Array._from_geometry(array)
     active, repeated, most = (
         np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, greatest)
     )
@@ -318,7 +318,7 @@ def _events(recording: Recording) -> Viewed:
     labels = _labels_beside(recording, int(events.t[0]) if len(events) else 0)
     ticks = None if held is None else np.where(np.isnan(held), UNKNOWN, held).astype(np.uint16).ravel()
     shown = _core.PanelRecording.of_events(
-        events._parts(),
+        events,
         ticks,
         0 if registers is None else registers.noise_floor,
         recording.path.parent,
@@ -396,7 +396,7 @@ def _frames(recording: Recording) -> Viewed:
     each = sources.items() if len(sources) > 1 else [("", sensor) for sensor in sources.values()]
     found = ((d.label, d.t, name) for name, sensor in each for d in sensor.detections)
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
-    read_frames = ReadFrames(array._parts(), parts, units.pop(), None if us == 1 else us)
+    read_frames = ReadFrames(array, parts, units.pop(), None if us == 1 else us)
     shown = _core.PanelRecording.of_frames(read_frames, recording.path.parent, available() // _MEMORY_SHARE)
     return Viewed(shown, _contents(shown, _verdict(recording), sorted_notes, found))
 
@@ -418,7 +418,7 @@ def _read(name: str, left: int, frames: Frames, us: int) -> ReadSource:
     return ReadSource(
         name,
         left,
-        frames.array._parts(),
+        frames.array,
         np.ascontiguousarray(frames.t * us),
         values,
         "given" if taken.source == "unit" else taken.source,

@@ -235,7 +235,7 @@ def held_at(table: Events | Frames, held: NDArray[np.float32] | None, start: flo
     begins = (
         np.full(table.array.shape, unknown, np.float32) if held is None else np.where(np.isnan(held), unknown, held)
     )
-    values = _core.HeldValues(earlier._parts(), None, begins.astype(np.float32).reshape(-1))
+    values = _core.HeldValues(earlier, None, begins.astype(np.float32).reshape(-1))
     at = values.at(np.array([earlier.t.max()])).reshape(table.array.shape)
     return np.where(at == unknown, np.nan, at).astype(np.float32)
 

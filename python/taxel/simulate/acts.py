@@ -188,9 +188,8 @@ class Scene:
         >>> Scene.draw(seed=1, index=3) == Scene.draw(seed=1, index=3)
         True
         """
-        parts = Array._of(array)._parts()
         seed, index = integer("seed", seed, 0), integer("index", index, 0, 1_000_000)
-        return cls(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest)))
+        return cls(_core.draw_scene(Array._of(array), seed, index, flag("left_to_rest", left_to_rest)))
 
     def replace(self, **changes: Any) -> Scene:
         """Return the scene with parameters changed. A mapping changes a part: ``foam={"dashpot_ms": 0}``.
@@ -260,7 +259,7 @@ class Scene:
         (19.0, 5)
         """
         step = number("step_us", step_us)
-        tracks, contacts, narrow = _core.motion(Array._of(array)._parts(), self._part(), step)
+        tracks, contacts, narrow = _core.motion(Array._of(array), self._part(), step)
         self._warn(narrow)
         return Motion(float(step_us), [Track(**track) for track in tracks], [Contact(**touch) for touch in contacts])
 

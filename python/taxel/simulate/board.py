@@ -102,7 +102,7 @@ def fitting(preset: str | None, array: Array) -> Registers:
         if max(array.shape) > _THESIS_LINES:
             return Registers(array=array)
         preset = "5.2 kHz"
-    values = _core.registers_preset(text("preset", preset), array._parts())
+    values = _core.registers_preset(text("preset", preset), array)
     try:
         return Registers._of(values, array)
     except DeviceError as error:
@@ -144,7 +144,7 @@ def pattern(frame: int, *, array: Array | None = None, ramp: int = 150) -> NDArr
     sensor = Array._of(array)
     y, x = (place.ravel().astype(np.uint16) for place in np.indices(sensor.shape))
     n = np.full(x.size, integer("frame", frame, 0) % 65_536, np.uint16)
-    values = _core.pattern_values(sensor._parts(), x, y, n, integer("ramp", ramp, 1, 65_534))
+    values = _core.pattern_values(sensor, x, y, n, integer("ramp", ramp, 1, 65_534))
     return values.reshape(sensor.shape)
 
 
@@ -218,7 +218,7 @@ class Board:
             "version_2": asdict(instance("version_2", Version2() if version_2 is None else version_2, Version2)),
             **reading(circuit, asynchronous),
         }
-        self._core = _core.WireBoard(start._json(), self.array._parts(), json.dumps(options))
+        self._core = _core.WireBoard(start._json(), self.array, json.dumps(options))
 
     def frame(self, ticks: ArrayLike, *, most: int | None = None, accepted: ArrayLike | None = None) -> list[bytes]:
         """Scan one frame; return the datagrams that were sent.

@@ -73,7 +73,7 @@ def truth(
     """
     sensed, acts = Array._of(array), several("acts", acts)
     registers = fitting(preset, sensed)._json()
-    contacts, force, narrow = _core.truth(sensed._parts(), registers, _parts(acts, sensed))
+    contacts, force, narrow = _core.truth(sensed, registers, _parts(acts, sensed))
     _warn(acts, narrow)
     return [Contact(**contact) for contact in contacts], force
 
@@ -137,7 +137,7 @@ def play(
     if wire is not None or flag("asynchronous", asynchronous):
         registers = registers.replace(wire_version=2 if wire is None else integer("wire", wire, 1, 2))
     played = _core.play(
-        sensed._parts(),
+        sensed,
         registers._json(),
         parameters({} if sensor is None else mapping("sensor", sensor)),
         integer("seed", seed, 0),
@@ -147,7 +147,7 @@ def play(
         callback("watch", watch),
     )
     _warn(acts, played.narrow)
-    return Played(Events._from_parts(played.events), played.datagrams, played.words, played.bytes)
+    return Played(Events._unchecked(**played.events, array=sensed), played.datagrams, played.words, played.bytes)
 
 
 @with_fields_of(EmulateOptions)
@@ -239,7 +239,7 @@ def emulate(to: str, options: EmulateOptions) -> EmulatorReport:
     callback("watch", options.watch), callback("touched", options.touched)
     report = _core.emulate(
         text("to", to),
-        sensed._parts(),
+        sensed,
         parameters({} if options.sensor is None else mapping("sensor", options.sensor)),
         integer("seed", options.seed, 0),
         felt,

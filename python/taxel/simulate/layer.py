@@ -97,7 +97,7 @@ class Layer:
             raise refused("tolerance", f" is {tolerance:g}: must be above 0 and below 1")
         self.cells_per_pitch = integer("cells_per_pitch", cells_per_pitch, 1, 16)
         self._core = _core.Layer(
-            self.array._parts(), parameters(self.foam), self.cells_per_pitch, number("tolerance", tolerance)
+            self.array, parameters(self.foam), self.cells_per_pitch, number("tolerance", tolerance)
         )
 
     @property

@@ -87,7 +87,7 @@ class Replay:
 
     def _touch(self, registers: Registers) -> tuple[Any, ...]:
         if isinstance(self.source, Events):
-            return self.source.sorted()._parts(), self.speed
+            return self.source.sorted(), self.speed
         values = self.source.values
         if self.source.unit != "ticks":
             values = (values - min(0.0, float(values.min()))) * (registers.ramp / max(float(np.ptp(values)), 1e-30))

@@ -135,7 +135,7 @@ class SceneFile:
             | {"bodies": _bodies(document["bodies"], folder)}
         )
         # Refuses what is invalid here, instead of when the scene is played.
-        _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
+        _core.check_scene(array, scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
             raise SceneError("foam: the force on the foam is too large for a float32; the foam must be softer")
         preset = text("preset", document["preset"]) if "preset" in document else cls.preset

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,30 +25,42 @@ _PIECE = _LARGE // 4
 _LEAST_WRITTEN = 1 / 8
 
 
-def filled(array: Array, rows: int, fill: Callable[[tuple[Any, ...]], _core._Filled]) -> Events:
+class Columns(NamedTuple):
+    """The columns of events that a decoder fills."""
+
+    t: NDArray[Any]
+    x: NDArray[Any]
+    y: NDArray[Any]
+    ticks: NDArray[Any]
+    p: NDArray[Any]
+    present: NDArray[Any]
+
+
+def filled(array: Array, rows: int, fill: Callable[[Columns], _core._Filled]) -> Events:
     """Return the events that `fill` writes into new columns with room for a number of rows."""
-    t, x, y, ticks, p, present = columns = _parts(rows) if rows < _PIECE else _columns(max(rows, _LARGE))
-    written = fill((t, x, y, ticks, p.view(np.uint8), present.view(np.uint8)))
+    columns = _parts(rows) if rows < _PIECE else _columns(max(rows, _LARGE))
+    written = fill(columns._replace(p=columns.p.view(np.uint8), present=columns.present.view(np.uint8)))
     n = written["rows"]
     if rows >= _PIECE:
         for column in columns:
             column.resize(n, refcheck=False)
     elif n < _LEAST_WRITTEN * rows:
-        columns = [column[:n].copy() for column in columns]
+        columns = Columns(*(column[:n].copy() for column in columns))
     t, x, y, ticks, p, present = (frozen_whole(column[:n]) for column in columns)
     intensity, stated = (ticks, present) if written["paired"] else (None, None)
-    return Events._unchecked(t, x, y, p, array, intensity, stated, written["repaired"], tuple(written["markers"]))
+    return Events._unchecked(t, x, y, p, array, intensity, stated, written["repaired"], written["markers"])
 
 
-def _columns(rows: int) -> list[NDArray[Any]]:
+def _columns(rows: int) -> Columns:
     """Return columns with a memory each."""
-    return [np.empty(rows, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.uint16, np.bool_, np.bool_)]
+    dtypes: tuple[Any, ...] = (np.int64, np.uint16, np.uint16, np.uint16, np.bool_, np.bool_)
+    return Columns(*(np.empty(rows, dtype) for dtype in dtypes))
 
 
-def _parts(rows: int) -> list[NDArray[Any]]:
+def _parts(rows: int) -> Columns:
     """Return columns in one memory, the widest first."""
     memory = np.empty(16 * rows, np.uint8)
     t = memory[: 8 * rows].view(np.int64)
     x, y, ticks = (memory[k * rows : (k + 2) * rows].view(np.uint16) for k in (8, 10, 12))
     p, present = memory[14 * rows : 15 * rows].view(np.bool_), memory[15 * rows :].view(np.bool_)
-    return [t, x, y, ticks, p, present]
+    return Columns(t, x, y, ticks, p, present)

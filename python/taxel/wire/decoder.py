@@ -68,7 +68,7 @@ def decode(
 
     def fill(columns: Any) -> _core._Filled:
         if decoder.version == 2:
-            return _core.decode_datagrams(stream, decoder.array._parts(), columns)
+            return _core.decode_datagrams(stream, decoder.array, columns)
         if lengths is not None:
             return decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), columns)
         return decoder._core.fill(stream, None, columns, True)
@@ -139,7 +139,7 @@ class Decoder:
         self.array = Array._of(array)
         if flag("differences", differences) and self.version == 2:
             raise refused("differences", " is only for version 1: a datagram of version 2 states it")
-        self._core = _core.WireDecoder(self.version, self.array._parts(), differences)
+        self._core = _core.WireDecoder(self.version, self.array, differences)
 
     def push(self, data: Any, arrived: int | None = None) -> Events:
         """Decode the next bytes of version 1, or a datagram of version 2; return the events that they complete.
@@ -182,7 +182,7 @@ class Decoder:
         >>> len(decoder.push(bytes.fromhex("c000050304"))), len(decoder.end_of_datagram())
         (0, 1)
         """
-        return Events._from_parts(self._core.end_of_datagram(), self.array)
+        return Events._unchecked(**self._core.end_of_datagram(), array=self.array)
 
     def finish(self) -> Events:
         """End a stream of version 1; return the pending events and reset the decoder except for its counts.
@@ -197,7 +197,7 @@ class Decoder:
         >>> len(decoder.push(bytes.fromhex("c000050304"))), len(decoder.finish())
         (0, 1)
         """
-        return Events._from_parts(self._core.finish(), self.array)
+        return Events._unchecked(**self._core.finish(), array=self.array)
 
     @property
     def counts(self) -> Counts:

@@ -35,4 +35,4 @@ def encode(events: Events) -> bytes:
     >>> encode(events).hex(" ", 5)
     'c000050304 e000280304'
     """
-    return _core.wire_encode(instance("events", events, Events)._parts())
+    return _core.wire_encode(instance("events", events, Events))

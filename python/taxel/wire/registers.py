@@ -165,12 +165,12 @@ class Registers:
     def __init__(self, *, array: Array | None = None, **fields: float) -> None:
         sensor = Array._of(array)
         channels = integer("channels", fields.get("channels", 16), 0, 255)
-        self._set(_core.registers_at_reset(sensor._parts(), channels), fields, sensor)
+        self._set(_core.registers_at_reset(sensor, channels), fields, sensor)
 
     def _set(self, values: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
         self.array = Array._of(array)
         raw = [(name, _raw(name, value)) for name, value in fields.items()]
-        self._held = _core.registers_with(json.dumps(values), raw, self.array._parts())
+        self._held = _core.registers_with(json.dumps(values), raw, self.array)
 
     @classmethod
     def preset(cls, name: str, *, array: Array | None = None) -> Registers:
@@ -210,13 +210,13 @@ class Registers:
         """Return the set that a file holds, in the registers' own units: its board may have had other rules."""
         registers = cls.__new__(cls)
         registers.array = array
-        registers._held = _core.registers_of_file(json.dumps(values), array._parts())
+        registers._held = _core.registers_of_file(json.dumps(values), array)
         return registers
 
     @classmethod
     def _of_source(cls, array: Array, rate_hz: float, bits: int) -> tuple[Registers, int]:
         """Return the registers of a board that scans another sensor's frames, and how often it halves their values."""
-        values, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
+        values, halved = _core.registers_of_source(array, rate_hz, bits)
         return cls._of(values, array), halved
 
     @classmethod
@@ -301,7 +301,7 @@ class Registers:
         (7.81, 10, 2)
         """
         preset = text("preset", name)
-        values = _core.registers_with_preset(self._json(), preset, self.array._parts())
+        values = _core.registers_with_preset(self._json(), preset, self.array)
         return self._of(values, self.array)
 
     @property
@@ -344,7 +344,7 @@ class Registers:
         [Command(register=5, value=4130560)]
         """
         wanted = instance("target", target, Registers)
-        commands = _core.registers_commands(self._json(), wanted._json(), self.array._parts())
+        commands = _core.registers_commands(self._json(), wanted._json(), self.array)
         return [Command(register, value) for register, value in commands]
 
     def _json(self) -> str:
@@ -377,8 +377,8 @@ def fitting_presets(held: Mapping[str, Any], array: Array | None) -> Iterator[st
     for name in PRESETS:
         if array is not None:
             try:
-                wanted = _core.registers_with_preset(json.dumps(held), name, array._parts())
-                _core.registers_with(json.dumps(wanted), [], array._parts())
+                wanted = _core.registers_with_preset(json.dumps(held), name, array)
+                _core.registers_with(json.dumps(wanted), [], array)
             except _core.Error:
                 continue
         yield name
@@ -391,7 +391,7 @@ def preset_of(held: Mapping[str, Any], array: Array | None) -> str | None:
         if array is None:
             preset = _core.registers_preset(name)
         else:
-            preset = _core.registers_with_preset(json.dumps(held), name, array._parts())
+            preset = _core.registers_with_preset(json.dumps(held), name, array)
         if held == preset:
             return name
     return None

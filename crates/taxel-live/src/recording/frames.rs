@@ -8,8 +8,6 @@ use prost::Message;
 use serde::{Deserialize, Serialize};
 use taxel_core::problem;
 
-use super::verdict::Found;
-
 /// Properties of a source of frames, beside its array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameProperties {
@@ -64,8 +62,6 @@ pub struct Frames {
     pub at_ns: Vec<i64>,
     /// Number of messages that are no frame of the source's array.
     pub bad: u64,
-    /// Of lines that were recorded as JSON: what could not be read, and what is wrong with the times.
-    pub found: Found,
 }
 
 /// How the values of a frame are encoded.

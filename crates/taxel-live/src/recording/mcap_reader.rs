@@ -18,7 +18,6 @@ use mcap::records::Record;
 use taxel_core::wire::{self, Decoder};
 use taxel_core::{Events, Stop, problem};
 
-use super::stream::RecordedLines;
 use super::{
     BoardChange, BoardChangeKind, Cause, Condition, Counts, FileEnding, Found, Frames, Header, Rebuilt,
     RecordingCounts, Topic, limits,
@@ -55,11 +54,7 @@ struct ReadPosition {
 
 /// The topic of what a source sends.
 fn data_of(source: &Header) -> Topic {
-    match (&source.stream, &source.frames) {
-        (Some(_), _) => Topic::Samples,
-        (_, Some(_)) => Topic::Frames,
-        _ => Topic::Datagrams,
-    }
+    if source.frames.is_some() { Topic::Frames } else { Topic::Datagrams }
 }
 
 /// A recording's datagrams as they arrived, stored one after the other.
@@ -130,13 +125,12 @@ impl Reader {
         let FileWalk { begin, end, ending, ends, blocks, rebuilt, .. } = walk;
         let blocks = Blocks { path: path.to_owned(), file, blocks };
         // The copy of the header in the chunk of the datagrams' channel has a checksum; the other copies have none.
-        let Some(mut header) = blocks.header()?.or(end).or(begin) else {
+        let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(Error::format(
                 path,
                 "is not a taxel recording: the header (metadata record \"taxel\") of this MCAP file is missing",
             ));
         };
-        header.state_frames();
         let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
         let mut reader = Self { blocks, header, source: 0, ending, ends, rebuilt, memory: u64::MAX };
         for source in (0..=reader.header.sources.len()).rev() {
@@ -364,23 +358,20 @@ impl Reader {
     /// `Core(Problem)` if the source is another; `Core` (format) if there are more than can be read; otherwise as
     /// [`Reader::messages`].
     pub fn frames(&self, stop: Stop<'_>) -> Result<Frames> {
-        let Header { name, array, frames, stream, .. } = self.header();
+        let Header { name, array, frames, .. } = self.header();
         if frames.is_none() {
             return Err(problem!("source {name}: contains no frames").into());
         }
-        let (mut all, mut lines) = (Frames::default(), stream.as_ref().map(RecordedLines::new));
+        let mut all = Frames::default();
         self.messages(stop, |message| {
-            if message.topic == data_of(self.header()) {
-                let values = array.len() + lines.as_ref().map_or(all.values.len(), RecordedLines::len);
+            if message.topic == Topic::Frames {
+                let values = array.len() + all.values.len();
                 self.fits("frames", 4 * values + 16 * values / array.len())?;
-                match &mut lines {
-                    Some(lines) => lines.push(message.at_ns, message.data),
-                    None => all.push(message.at_ns, message.data, array.rows, array.columns),
-                }
+                all.push(message.at_ns, message.data, array.rows, array.columns);
             }
             Ok(())
         })?;
-        Ok(lines.map_or(all, RecordedLines::finish))
+        Ok(all)
     }
 
     /// Decodes all datagrams.

@@ -1,108 +1,10 @@
-//! The times of lines of numbers, with or without stamps of their own, and lines that recordings before 0.1.0 hold as JSON.
+//! The times of lines of numbers, with or without stamps of their own.
 
 mod clock;
 
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
-
 use super::causes::Cause;
-use super::frames::{FrameProperties, Frames};
 use super::verdict::Found;
 use clock::StreamClock;
-
-/// The columns of lines that recordings before 0.1.0 hold as JSON.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StreamColumns {
-    /// The names of all columns.
-    pub columns: Vec<String>,
-    /// The column of the source's own clock; without one, a line's time is its arrival time.
-    #[serde(default)]
-    pub time: Option<String>,
-    /// Unit of that clock, us.
-    #[serde(default = "default_unit")]
-    pub unit_us: f64,
-    /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
-    #[serde(default)]
-    pub waited: bool,
-}
-
-fn default_unit() -> f64 {
-    1.0
-}
-
-impl StreamColumns {
-    /// The names of the columns of values, without the clock.
-    pub fn values(&self) -> impl Iterator<Item = &String> {
-        self.columns.iter().filter(|name| Some(*name) != self.time.as_ref())
-    }
-
-    /// The properties of its frames.
-    pub(super) fn properties(&self) -> FrameProperties {
-        FrameProperties {
-            unit: "as sent".to_owned(),
-            clock: true,
-            columns: self.values().cloned().collect(),
-            turned: None,
-            frame_us: None,
-            arrivals: !self.waited,
-        }
-    }
-}
-
-/// Whether a number is a value that frames hold, which have 32 bits, or NaN, a missing one; infinity is none.
-pub(crate) fn is_held(value: f64) -> bool {
-    value.is_nan() || value.abs() <= f64::from(f32::MAX)
-}
-
-/// Reads lines that were recorded as JSON, as frames of one row.
-#[derive(Debug)]
-pub(super) struct RecordedLines<'a> {
-    stream: &'a StreamColumns,
-    frames: Frames,
-    faults: StreamFaults,
-}
-
-impl<'a> RecordedLines<'a> {
-    pub(super) fn new(stream: &'a StreamColumns) -> Self {
-        let faults = StreamFaults::new(stream.unit_us, stream.waited);
-        Self { stream, frames: Frames::default(), faults }
-    }
-
-    pub(super) fn push(&mut self, at_ns: i64, data: &[u8]) {
-        if self.read(at_ns, data).is_none() {
-            self.faults.found.counts[Cause::Strange] += 1;
-        }
-    }
-
-    /// Number of values so far.
-    pub(super) fn len(&self) -> usize {
-        self.frames.values.len()
-    }
-
-    /// Reads the time and the values of a message; a value that JSON cannot represent becomes NaN.
-    fn read(&mut self, at_ns: i64, data: &[u8]) -> Option<()> {
-        let message: Value = serde_json::from_slice(data).ok()?;
-        let named = message.get("values")?.as_object()?;
-        let values = self.stream.values().map(|name| Some(named.get(name)?.as_f64().unwrap_or(f64::NAN)));
-        let values = values.collect::<Option<Vec<f64>>>().filter(|values| values.iter().copied().all(is_held))?;
-        let stamp = match &self.stream.time {
-            None => None,
-            Some(time) => Some(named.get(time)?.as_f64()?),
-        };
-        let t = self.faults.time(stamp, at_ns)?;
-        // As live, times ascend.
-        self.frames.t.push(self.frames.t.last().map_or(t, |last| t.max(last + 1)));
-        self.frames.at_ns.push(at_ns);
-        self.faults.missing(values.iter().copied());
-        #[allow(clippy::cast_possible_truncation)]
-        self.frames.values.extend(values.iter().map(|&value| value as f32));
-        Some(())
-    }
-
-    pub(super) fn finish(self) -> Frames {
-        Frames { found: self.faults.found, ..self.frames }
-    }
-}
 
 /// Counts what could not be read of a stream, and what is wrong with its stamps: while it is recorded as in its file.
 #[derive(Debug, Clone)]
@@ -278,35 +180,6 @@ mod tests {
         assert_eq!((told.drifts, told.anew + told.back + told.jumps), (1, 0));
         let after = told.after.unwrap();
         assert!((30_000_000 - 200_000..=30_000_000).contains(&after), "{after}");
-    }
-
-    fn lines(columns: &[&str]) -> StreamColumns {
-        let time = columns.iter().find(|name| **name == "t_ms").map(ToString::to_string);
-        StreamColumns { columns: columns.iter().map(ToString::to_string).collect(), time, unit_us: 1e3, waited: false }
-    }
-
-    #[test]
-    fn lines_that_were_recorded_as_json_are_frames_whose_times_ascend() {
-        let stream = lines(&["a", "t_ms", "b"]);
-        let mut read = RecordedLines::new(&stream);
-        let messages = [
-            r#"{"values":{"a":1,"t_ms":20,"b":2.5}}"#,
-            r#"{"values":{"a":null,"t_ms":19.5,"b":-3e38}}"#,
-            r#"{"values":{"a":5,"t_ms":20,"b":6}}"#,
-            // Not read: a value that no frame holds, no time, a column that is missing, text.
-            r#"{"values":{"a":1e39,"t_ms":21,"b":0}}"#,
-            r#"{"values":{"a":1,"t_ms":1e300,"b":0}}"#,
-            r#"{"values":{"a":1,"t_ms":22}}"#,
-            r#"{"line":"nonsense"}"#,
-        ];
-        for (at_ns, message) in (0..).zip(messages) {
-            read.push(at_ns, message.as_bytes());
-        }
-        let Frames { t, values, at_ns, bad, found } = read.finish();
-        assert_eq!((t, at_ns, bad), (vec![20_000, 20_001, 20_002], vec![0, 1, 2], 0));
-        assert!(values[2].is_nan());
-        assert_eq!((&values[..2], &values[3..]), (&[1.0, 2.5][..], &[-3e38, 5.0, 6.0][..]));
-        assert_eq!([Cause::Strange, Cause::Missing, Cause::StampsBack].map(|cause| found.counts[cause]), [4, 1, 1]);
     }
 
     #[test]

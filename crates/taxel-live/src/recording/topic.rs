@@ -28,8 +28,6 @@ pub enum Topic {
     Held = 8,
     /// Resets of the board, and changes of its version of the wire.
     Board = 9,
-    /// Lines of numbers as JSON, of recordings before 0.1.0; numbers are frames.
-    Samples = 10,
     /// Frames at full rate.
     Frames = 11,
     /// Lines of a source of frames that were not read, as they came.
@@ -41,7 +39,7 @@ const NEXT_SOURCE: u16 = 16;
 
 impl Topic {
     /// All channels, by number.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 11] = [
         Self::Datagrams,
         Self::Registers,
         Self::Markers,
@@ -51,7 +49,6 @@ impl Topic {
         Self::Pressure,
         Self::Held,
         Self::Board,
-        Self::Samples,
         Self::Frames,
         Self::Lines,
     ];
@@ -69,7 +66,6 @@ impl Topic {
             Self::Pressure => "/pressure",
             Self::Held => "/held",
             Self::Board => "/board",
-            Self::Samples => "/samples",
             Self::Frames => "/frames",
             Self::Lines => "/lines",
         }
@@ -85,10 +81,10 @@ impl Topic {
     }
 
     /// Name, encoding and text of the schema of the channel's messages; datagrams have none, because they are the board's
-    /// own bytes, and what is only read.
+    /// own bytes.
     pub(super) fn schema(self) -> Option<(&'static str, &'static str, &'static [u8])> {
         let (name, text) = match self {
-            Self::Datagrams | Self::Samples => return None,
+            Self::Datagrams => return None,
             // A `FileDescriptorSet` of protobuf: foxglove/RawImage.proto and the time stamp that it uses.
             Self::Frames | Self::Pressure => {
                 return Some(("foxglove.RawImage", "protobuf", include_bytes!("schemas/RawImage.bin")));
@@ -105,15 +101,15 @@ impl Topic {
         Some((name, "jsonschema", text.as_bytes()))
     }
 
-    /// Whether the channel holds what a source sends: datagrams, lines or frames.
+    /// Whether the channel holds what a source sends: datagrams or frames.
     pub(super) fn is_data(self) -> bool {
-        matches!(self, Self::Datagrams | Self::Samples | Self::Frames)
+        matches!(self, Self::Datagrams | Self::Frames)
     }
 
     /// The cause of messages of the channel that a file has lost; none where nothing is lost by them.
     pub(super) fn lost_in_file(self) -> Option<Cause> {
         Some(match self {
-            Self::Datagrams | Self::Samples | Self::Frames => Cause::DataInFile,
+            Self::Datagrams | Self::Frames => Cause::DataInFile,
             Self::Registers => Cause::RegistersInFile,
             Self::Markers => Cause::MarkersInFile,
             Self::Notes => Cause::NotesInFile,

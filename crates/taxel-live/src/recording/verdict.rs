@@ -48,8 +48,7 @@ pub struct Verdict {
     pub status: RecordingStatus,
     /// Why what came last is missing, if it is.
     pub ended: Option<String>,
-    /// What is known where no loss is; older files have the whole line.
-    #[serde(alias = "text")]
+    /// What is known where no loss is.
     pub known: String,
     /// Whether more may be lost than was counted.
     pub at_least: bool,

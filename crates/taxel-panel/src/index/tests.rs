@@ -1,4 +1,4 @@
-//! The latest of a live source can be viewed at any time.
+//! The latest of a live source can be viewed at any time; a taxel's values over hours are those of all of its changes.
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::Array;
@@ -58,4 +58,58 @@ fn a_minute_is_stored_and_a_view_of_the_past_equals_what_was_decoded() {
         let (held, events) = held_at(&all, first, taxels);
         (held, events)
     });
+}
+
+/// The taxel whose history is shown.
+const WATCHED: u32 = 5;
+
+/// Its least, greatest and last value in these columns, computed from all changes up to `t`.
+fn drawn(changes: &[TaxelChange], columns: std::ops::Range<i64>, us: i64, t: i64) -> Vec<u16> {
+    let own: Vec<_> = changes.iter().filter(|change| change.taxel == WATCHED && change.t <= t).collect();
+    let until = |column: i64| own.partition_point(|change| change.t < column * us);
+    let mut values = vec![];
+    for column in columns {
+        // At its beginning a column has what was held before it.
+        let within = &own[until(column).saturating_sub(1)..until(column + 1)];
+        let ticks = || within.iter().map(|change| change.ticks);
+        values.extend([ticks().min(), ticks().max(), ticks().next_back()].map(|value| value.unwrap_or(UNKNOWN)));
+    }
+    values
+}
+
+#[test]
+fn a_window_of_hours_has_the_least_and_the_greatest_of_a_taxel_at_each_width() {
+    let mut random = StdRng::seed_from_u64(25);
+    let sensor = Sensor::new(Array::new(8, 8, 1.0, "small").unwrap(), 3, None);
+    let mut t = 0;
+    let all: Vec<TaxelChange> = (0..3_000_000)
+        .map(|k| {
+            // Three hours, now and then a minute without events. What is watched changes in one stretch of ten alone.
+            t += if random.random_range(0..100_000) == 0 { MINUTE_US } else { random.random_range(0..7000) };
+            let quiet = k / 150_000 % 10 != 0;
+            let taxel =
+                (0..).find_map(|_| Some(random.random_range(0..64)).filter(|&taxel| taxel != WATCHED || !quiet));
+            change(t, taxel.unwrap(), random.random_range(20..140))
+        })
+        .collect();
+    for memory in [1 << 20, u64::MAX] {
+        let kept = Kept::All { memory, folder: std::env::temp_dir() };
+        let sensor = Sensor::new(sensor.array.clone(), 3, None);
+        let mut indexing = Indexing::new(sensor, &Keyframe::blank(64), kept);
+        all.chunks(CHANGES).for_each(|block| indexing.push(changes(block)).unwrap());
+        let index = Arc::new(indexing.finish());
+        for us in [125 << 17, 125 << 14, COLUMN_US, 125] {
+            for at in [t, t / 2, random.random_range(0..t)] {
+                let options = ViewOptions { watched: Some(WATCHED), ..ViewOptions::plain(us) };
+                let mut player = Player::open(&index, at - 3 * us, &options, None).unwrap();
+                player.advance(at).unwrap();
+                let first = (column_of(at, us) + 1 - crate::columns::SPAN).max(column_of(all[0].t, us));
+                let mut bytes = vec![];
+                player.history.as_ref().unwrap().write(first..column_of(at, us) + 1, &mut bytes);
+                let shown: Vec<u16> = bytes.chunks(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect();
+                let expected = drawn(&all, first..column_of(at, us) + 1, us, at);
+                assert!(shown == expected, "{us} us a column, at {at} us, {memory} bytes");
+            }
+        }
+    }
 }

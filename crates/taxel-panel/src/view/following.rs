@@ -1,7 +1,5 @@
 //! A view that follows a live source: what it shows beside the state that all clients share.
 
-use std::sync::Arc;
-
 use taxel_live::Result;
 use taxel_live::locked::lock;
 
@@ -9,7 +7,6 @@ use crate::columns::SPAN;
 use crate::history::TaxelHistory;
 use crate::live_source::LiveSource;
 use crate::player::ViewOptions;
-use crate::state::Keyframe;
 use crate::view::frame::{self, About};
 
 /// What a client that follows a live source needs beside the shared state.
@@ -23,14 +20,11 @@ pub(super) struct Following {
 impl Following {
     /// Begins the history before all columns that are shown.
     pub(super) fn begin(live: &LiveSource, options: &ViewOptions) -> Result<Self> {
-        let index = &live.index;
+        let (index, next) = (&live.index, live.index.end());
         let now = index.range().map_or(i64::MIN, |(_, latest)| latest);
-        let begin = now.saturating_sub(SPAN * options.column_us);
-        let blank = || (Arc::new(Keyframe::blank(index.sensor.array.len())), index.end());
-        let (from, next) = index.open(begin).unwrap_or_else(|_| blank());
-        let mut following = Self { history: options.history(&from), next };
-        following.read(live)?;
-        Ok(following)
+        let since = now.saturating_sub(SPAN * options.column_us);
+        let begin = |taxel| index.history(taxel, options.column_us, since, next);
+        Ok(Self { history: options.watched.map(begin).transpose()?, next })
     }
 
     /// Reads what has arrived since the last call.

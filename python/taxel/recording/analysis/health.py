@@ -129,9 +129,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
         return _of_events(table)
     if not isinstance(table, Frames):
         raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
-    activity, moved = (
-        grid.astype(np.int64).reshape(table.array.shape) for grid in _core.changes_of_frames(table._parts())
-    )
+    activity, moved = (grid.astype(np.int64).reshape(table.array.shape) for grid in _core.changes_of_frames(table))
     # The values of frames count from the least one.
     (lowest, most), scale = extremes(table), ticks_by_unit(table)
     least, ticks = np.fmin.reduce(lowest, axis=None, initial=np.inf), table
@@ -141,7 +139,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
             values = table.values - least
             ticks = Frames(frozen(np.multiply(values, scale, out=values)), table.t, array=table.array)
         above = np.multiply(most - least, scale) > NOISE_FLOOR
-    touches = _core.touches_of_frames(ticks._parts(), 0.0 if table.unit in FORCE_UNITS else np.nan)
+    touches = _core.touches_of_frames(ticks, 0.0 if table.unit in FORCE_UNITS else np.nan)
     return judge(table.array, activity, moved, touches, above)
 
 
@@ -157,7 +155,7 @@ def _of_events(events: Events) -> Health:
     above = np.zeros(size, bool)
     if events.intensity is not None and events.present is not None:
         above[index[events.present & (events.intensity > 0)]] = True
-    touches = _core.touches_of_events(events.sorted()._parts())
+    touches = _core.touches_of_events(events.sorted())
     return judge(array, activity, moved, touches, above.reshape(array.shape))
 
 

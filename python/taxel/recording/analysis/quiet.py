@@ -164,7 +164,7 @@ def held_values(recording: Recording) -> _core.HeldValues:
     """Return what the taxels hold over time; NaN before the first event of a taxel whose value was not known."""
     unknown = np.full(recording.array.shape, np.nan, np.float32)
     begins = unknown if recording.held is None else recording.held
-    return _core.HeldValues(recording.events._parts(), None, begins.reshape(-1))
+    return _core.HeldValues(recording.events, None, begins.reshape(-1))
 
 
 def interval(recording: Recording) -> tuple[int, int]:

@@ -64,7 +64,7 @@ def read_lsa(path: Path, array: Array | None = None, *, differences: bool = Fals
             ".mcap file",
             path,
         )
-    decoder = _core.WireDecoder(1, array._parts(), differences)
+    decoder = _core.WireDecoder(1, array, differences)
     events = filled(array, rows, lambda columns: decoder.fill(payload, None, columns, True))
     decoded, marker = decoder.counts(), path.with_suffix(".lss")
     complete = marker.exists()

@@ -112,7 +112,7 @@ class McapReader(Reader):
     def _table(self) -> Events | Frames:
         array = self.facts.array
         if self._frames is None:
-            return Events._from_parts(self._decoded.events, array)
+            return Events._unchecked(**self._decoded.events, array=array)
         t, values = self._read_frames["t"], self._read_frames["values"]
         try:
             shaped = frozen(values).reshape(len(t), *array.shape)
@@ -175,11 +175,9 @@ class McapReader(Reader):
     @cached_property
     def _verdict(self) -> Verdict:
         condition = self._remarks.condition
-        # The counts of frames, but not those of lines that were recorded as JSON, say all.
-        can_decode = self._frames is None or "stream" in self._header
-        if can_decode and condition["messages"] and self._must_decode():
-            found = self._decoded.found if self._frames is None else self._read_frames["found"]
-            condition = condition | {"decoded": found}
+        # The counts of frames say all.
+        if self._frames is None and condition["messages"] and self._must_decode():
+            condition = condition | {"decoded": self._decoded.found}
         return Verdict._of({"file": condition})
 
     def verdict(self) -> Verdict:
@@ -240,12 +238,12 @@ class McapReader(Reader):
 
     def _counts_of_frames(self) -> dict[str, Any]:
         read = self._read_frames
-        found, recorded = read["found"]["counts"], (self._counted or self._remarks.counts or {}).get("decoder", {})
+        recorded = (self._counted or self._remarks.counts or {}).get("decoder", {})
         of_lines = _OF_STREAMS if self.facts.columns else ()
         return {
             "frames": len(read["t"]),
             "frames_that_could_not_be_read": read["bad"],
-            **{cause: max(found.get(cause, 0), recorded.get(cause, 0)) for cause in of_lines},
+            **{cause: recorded.get(cause, 0) for cause in of_lines},
             "received": self._counted.get("received"),
         }
 

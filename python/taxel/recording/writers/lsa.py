@@ -47,7 +47,7 @@ def write_lsa(path: Path, source: SourceView, *, overwrite: bool) -> list[str]:
         times = np.concatenate([events.t, np.array([at for at, _ in events.markers], np.int64)])
         lost += ["times finer than 100 us"] * bool((times % STAMP_US).any())
         lost += ["which events are repaired"] * (events.repaired is not None)
-        payload = np.frombuffer(_core.wire_encode(events._parts()), np.uint8)
+        payload = np.frombuffer(_core.wire_encode(events), np.uint8)
     differences = isinstance(received, Datagrams) and received.differences and is_as_received
     lost += ["the fact that intensities are differences"] * differences
     again = wire_decode(payload, array=source.array, differences=differences)

@@ -219,7 +219,7 @@ def encode_events(events: Events, held: NDArray[np.float32] | None, clock: Clock
     ProblemError : an array of more than 65 536 positions, or times more than 8.9 years apart
     """
     try:
-        encoded = _core.encode_datagrams(events._parts(), ticks_of(held), clock is not None)
+        encoded = _core.encode_datagrams(events, ticks_of(held), clock is not None)
     except ProblemError as error:
         smaller = "to make fewer taxels of an event camera's file, use region and bin"
         raise ProblemError(f"{first_line(error)}; write such events to a .npz, .h5 or .csv; {smaller}") from None
@@ -267,7 +267,7 @@ def _add_remarks(writer: Any, events: Events, source: SourceView) -> None:
 def _add_previews(writer: Any, events: Events, at_ns: Callable[[int], int]) -> None:
     """Write what taxels hold, for viewers: at each multiple of 100 ms, if an event occurred in the 100 ms up to it."""
     times = np.unique(-(-events.t // _PREVIEW_US) * _PREVIEW_US)
-    held = _core.HeldValues(events._parts(), None, None)
+    held = _core.HeldValues(events, None, None)
     for t in times.tolist():
         writer.preview(at_ns(t), t, held.at(np.array([t])).astype(np.uint16))
 

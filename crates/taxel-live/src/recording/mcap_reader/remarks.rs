@@ -55,7 +55,7 @@ impl Remarks {
                 let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
             }
-            Topic::Pressure | Topic::Frames | Topic::Samples | Topic::Lines => {}
+            Topic::Pressure | Topic::Frames | Topic::Lines => {}
             // The checksum of a message that does not parse is valid, so another program wrote the message; it is
             // ignored.
             Topic::Registers => {
