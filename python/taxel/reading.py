@@ -1,6 +1,7 @@
 """What a reader of files returns: facts, a table and marks of one source, and the view that a recording has of it.
 
-A reader of another format returns `InMemory`; `taxel.recording` looks at it through a `View`.
+A reader of another format returns `InMemory`; `taxel.recording` looks at it through a `View`. To read texts in any
+encoding it has `Text` and `beginning`, and for errors with their place `unreadable`.
 
 Examples
 --------
@@ -19,6 +20,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.errors import unreadable
+from taxel._base.table_text import Text, beginning
 from taxel.array import Array
 from taxel.clock import Clock
 from taxel.detections import Detections
@@ -36,10 +39,13 @@ __all__ = [
     "InMemory",
     "Marks",
     "Reader",
+    "Text",
     "View",
     "Zeroing",
     "after_zeros",
+    "beginning",
     "kind_of_file",
+    "unreadable",
 ]  # fmt: skip
 
 #: Converts times of one clock to those of another, us.
@@ -51,7 +57,7 @@ ENDINGS: dict[str, str] = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv"
 _LEAST = 2
 #: Kinds of files that are no recordings of one format.
 _OTHERS = {"arrays": "file of arrays", "records": "file of events", "table": "table", "ros": "ROS bag"}
-_OTHERS |= {"lerobot": "LeRobot data set", "neutouch": "NeuTouch recording"}
+_OTHERS["lerobot"] = "LeRobot data set"
 
 
 def after_zeros(frames: Frames, seconds: float) -> Frames:

@@ -20,7 +20,7 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import emed, event_camera, insoles, lerobot, neutouch, tekscan, xdf
+from taxel.formats import event_camera, lerobot, xdf
 from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
@@ -102,15 +102,6 @@ class Kind:
     read: Callable[[Path, Layout | None], Sequence[Reader]]
 
 
-_MODULES = {"emed": emed, "tekscan": tekscan, "xdf": xdf, "neutouch": neutouch, "lerobot": lerobot}
-#: Files of makers and of recorders.
-MAKERS = {
-    "moticon": Kind(insoles.is_moticon, insoles.read_moticon),
-    "pedar": Kind(insoles.is_pedar, insoles.read_pedar),
-    **{name: Kind(module.knows, module.read) for name, module in _MODULES.items()},
-}
-
-
 def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     """Yield the kinds of files with their names, in the order in which they are tried.
 
@@ -157,7 +148,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     }.items()
     yield from _from_elsewhere().items()
     yield from {
-        **MAKERS,
+        "xdf": Kind(xdf.knows, xdf.read),
         "lerobot": Kind(lerobot.knows, lambda path, layout: lerobot.read(path, layout, how.label_column)),
         "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
