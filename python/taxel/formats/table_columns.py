@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel._base.table_text import Text
 from taxel.formats.column_names import FORCES, OTHER_UNITS, axes_of, is_time, says, time_unit, unit_of
-from taxel.formats.form import left_out, places_of
+from taxel.formats.form import Form, left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
@@ -117,6 +117,11 @@ class Draft:
     def set(self, **keys: Any) -> None:
         """Set keys of the table."""
         self.table = replace(self.table, **keys)
+
+    def form(self, said: Sequence[str], **of_frames: Any) -> Form:
+        """Return how lines are read by it."""
+        fit = self.fit
+        return Form(self.table, self.names, fit.first, tuple(said), fit.own, roles=self.roles, fit=fit, **of_frames)
 
 
 def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
@@ -569,7 +574,7 @@ def said_of(draft: Draft, time: int | None) -> Iterator[str]:
     table = draft.table
     marks = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks", "|": "bars"}
     kinds = {"marked": "marks and names between cells", "json": "lines of JSON", "hex": "hexadecimal"}
-    if draft.layout.table is None:
+    if draft.layout.table is None or draft.layout.source is not None:
         yield kinds.get(table.lines, f"separated by {marks.get(table.separator, table.separator)}")
         if table.decimal == ",":
             yield "decimal commas"

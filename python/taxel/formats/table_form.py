@@ -87,11 +87,6 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     return form, full
 
 
-def _own(how: Table, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names that lines of a table have themselves."""
-    return names if how.lines in ("marked", "json") and not how.columns and any(names) else ()
-
-
 def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
     """Return the form of a table as the layout states it, and else as it fits its lines best; and the whole layout."""
     lines, stated = text.head, layout.table or Table()
@@ -139,9 +134,8 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
         right = "write them as 2024-05-01T10:00:00.25, or state rate_hz and leave_out in a layout file"
         raise unreadable(f"column {unread[0]} has times in a form that taxel does not read; {right}", text.path)
     refuse_open(text.path, "can be read in", full, draft.roles, draft.questions)
-    how = full.table or draft.table
-    said = (*said_of(draft, time), *draft.said)
-    return Form(how, draft.names, draft.fit.first, said, _own(how, draft.names), roles=draft.roles, fit=draft.fit), full
+    draft.table = full.table or draft.table
+    return draft.form((*said_of(draft, time), *draft.said)), full
 
 
 def _draft(text: Text, layout: Layout, lines: Sequence[str]) -> Draft:
@@ -236,11 +230,10 @@ def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
     table = replace(layout.table or Table(), **keys, lines=fit.kind, skip_lines=fit.first)
     if fit.kind != "plain":
         table = replace(table, separator=fit.separator if fit.kind == "hex" else ",")
-        own = fit.lines[fit.body[0]][1].names
         # The places in a list are no names.
-        own = () if all(map(_PLACE_IN_LIST.fullmatch, own)) else own
-        names = own if any(own) else _names_above_marks(fit, lines)
-        if not any(own) and any(names):
+        own = () if all(map(_PLACE_IN_LIST.fullmatch, fit.own)) else fit.own
+        names = own or _names_above_marks(fit, lines)
+        if not own and any(names):
             table = replace(table, columns=list(names))
         return Draft(fit, table, names, (), layout)
     real = fit.count
