@@ -1,3 +1,3 @@
-"""Files of makers of insoles, plates, mats and skins: a module for each, found by entry points of `taxel.formats`."""
+"""Files of makers and of recorders: a module for each, which taxel finds by an entry point of `taxel.formats`."""
 
 __all__: list[str] = []

@@ -20,7 +20,7 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import event_camera, lerobot, xdf
+from taxel.formats import event_camera, lerobot
 from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
@@ -148,7 +148,6 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     }.items()
     yield from _from_elsewhere().items()
     yield from {
-        "xdf": Kind(xdf.knows, xdf.read),
         "lerobot": Kind(lerobot.knows, lambda path, layout: lerobot.read(path, layout, how.label_column)),
         "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),

@@ -293,8 +293,8 @@ def _refuse_folder(folder: Path) -> None:
     ]
     hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} contain recordings: name these folders"
     known = (
-        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), LeRobot data sets, .xdf, event cameras, "
-        "and arrays and tables of other programs, for example .npy and .txt (docs/files.md)"
+        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), LeRobot data sets, event cameras, and "
+        "arrays and tables of other programs, for example .npy and .txt (docs/files.md)"
     )
     raise FormatError(f"{folder}: contains no recording; {hint if deeper else known}")
 
