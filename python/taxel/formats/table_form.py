@@ -53,15 +53,13 @@ _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 _COMMENT = re.compile(r"(?:#+|(?:[%;!*]|//)+(?=\s|$))\s*")
 
 
-def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -> tuple[Form, Layout]:
+def form_of(text: Text, layout: Layout) -> tuple[Form, Layout]:
     """Return how a table is read, as its layout says, or, if it says nothing of the table, as its first lines look.
 
     Parameters
     ----------
     text : Text
     layout : Layout
-    label_column : str or int, optional
-        As of `taxel.formats.layout.Table`.
 
     Returns
     -------
@@ -74,8 +72,6 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     FormatError : no table of numbers, one that the layout does not fit, or two readings that fit about equally (prints
         the layout of each)
     """
-    if label_column is not None:
-        layout = replace(layout, table=replace(layout.table or Table(), label_column=label_column))
     try:
         form, full = _found(text, layout)
         if not form.taxels:

@@ -1,6 +1,6 @@
 """Data sets of LeRobot: episodes are trials, touch features are sources, and detections join with the tables.
 
-``tests/data/lerobot`` was written by lerobot-dataset 0.4.4 (version 3.0; without its statistics, and with a
+``data`` was written by lerobot-dataset 0.4.4 (version 3.0; without its statistics, and with a
 stand-in for torch, which its writer imports alone). That of version 2.1 is written here by its documented form.
 """
 
@@ -21,7 +21,7 @@ import taxel
 from taxel import FormatError, ProblemError
 from taxel._base.errors import Place
 
-WRITTEN = Path(__file__).parents[1] / "data" / "lerobot"
+WRITTEN = Path(__file__).parent / "data"
 DATA = pd.read_parquet(WRITTEN / "data" / "chunk-000" / "file-000.parquet")
 
 
