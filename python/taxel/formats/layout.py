@@ -194,8 +194,8 @@ class Data:
         if self.axes is not None:
             named = text("axes", self.axes).split()
             once = {"column" if name == "taxel" else name for name in named}
-            if len(once) < len(named) or "time" not in named or not set(named) <= set(_AXES_OF_ARRAYS):
-                others = f"time and others of {', '.join(_AXES_OF_ARRAYS)}, taxel without column"
+            if len(once) < len(named) or "time" not in named or not set(named) <= set(AXES_OF_ARRAYS):
+                others = f"time and others of {', '.join(AXES_OF_ARRAYS)}, taxel without column"
                 raise refused("axes", f" is {shown(self.axes)}: must be {others}")
 
 
@@ -210,7 +210,7 @@ class PrintedFrames:
     baud : int, optional
         Baud rate of a serial line.
     time : str, optional
-        "t:ms", "1+2" ...; default: the time of arrival.
+        "t:ms", "1+2" ..., or "0", the time of arrival; default: a column that looks like it, else that of arrival.
     columns, leave_out : list of str or int
         The names of the columns; those without values.
     frame_lines : int, 1 or more, optional
@@ -246,7 +246,7 @@ class PrintedFrames:
         table = Table(
             columns=self.columns,
             leave_out=self.leave_out,
-            time_column=time or None,
+            time_column=0 if time == "0" else time or None,
             time_unit=unit or "s",
             frame_lines=self.frame_lines,
             frame_end=self.frame_end,
@@ -494,7 +494,7 @@ _TABLES: dict[str, type[Any]] = {
 
 
 #: What axes of an array may count.
-_AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
+AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
 
 
 def _known(table: str, values: Mapping[str, Any]) -> None:

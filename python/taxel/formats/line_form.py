@@ -15,7 +15,7 @@ from taxel.formats.layout import PrintedFrames
 from taxel.formats.line_fits import FITS, fits_in
 from taxel.formats.parts import sensors_in
 from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, find_taxels, said_of, time_of
-from taxel.formats.table_form import draft_of, lines_between_blanks
+from taxel.formats.table_form import draft_of, find_blanks
 from taxel.formats.times import ISO
 
 
@@ -50,19 +50,13 @@ def form_of_lines(
     draft = _reading_of_lines(lines, stated, size)
     if draft is None:
         return None
-    fit, names, left, keys = draft.fit, draft.names, draft.stated_left, dict[str, str]()
+    fit, names, left = draft.fit, draft.names, draft.stated_left
     times = places_of(names, "time", draft.table.time_column) if draft.table.time_column else ()
     of_line = None if size is None else size // (stated.frame_lines or 1)
     is_whole = fit.count - len({*left, *times}) == of_line and not any(map(time_unit, names))
-    per_frame = 0 if stated.frame_end is not None else stated.frame_lines or 1
-    if (
-        not (is_whole or draft.is_stated("frame_lines", "frame_end"))
-        and (group := lines_between_blanks(fit, lines, from_begin=False)) > 1
-    ):
-        per_frame, keys["frame_end"] = group, "blank"
-        draft.said.append(f"{group} lines per frame, between empty lines")
-        draft.set(frame_end="blank")
-    time = None if is_whole and not times else time_of(draft, by_name=not are_taxels)
+    if not (is_whole or draft.is_stated("frame_lines", "frame_end")):
+        find_blanks(draft, lines)
+    time = None if not times and (is_whole or stated.time) else time_of(draft, by_name=not are_taxels)
     if time is not None:
         is_found, times = not times, places_of(names, "time", draft.table.time_column or 0)
         is_text = fit.types[time] == "time"
@@ -74,7 +68,6 @@ def form_of_lines(
                 draft.answer("time_unit")
         if is_found:
             ask_for_lines_of_one_time(draft, time)
-            keys["time"] = f"{draft.table.time_column}:{draft.table.time_unit}".removesuffix(":s" * (len(times) > 1))
     if is_whole or stated.leave_out or stated.columns or not are_taxels:
         draft.questions.clear()
         draft.be("no taxel", "texts", *(k for k in range(len(names)) if fit.types[k] == "text"))
@@ -89,15 +82,8 @@ def form_of_lines(
         unclear.append(f"column {draft.table.taxel_column} names the taxel of each line")
     if unclear:
         raise ProblemError(f"{unclear[0]}: state what it is by time=COLUMN:UNIT, leave_out= or frame_lines=")
-    gone = [str(k + 1) for k, why in draft.left.items() if k not in left and why != EMPTY]
-    if gone and are_taxels:
-        keys["leave_out"] = ":".join([*map(str, stated.leave_out), *gone])
     draft.set(leave_out=[k + 1 for k in draft.left], label_column=None)
-    return draft.form(tuple(said_of(draft, time)), lines=per_frame, keys=keys)
-
-
-#: Why a last column that is empty throughout is left out.
-EMPTY = "empty"
+    return draft.form(tuple(said_of(draft, time)))
 
 
 def _reading_of_lines(lines: Sequence[str], stated: PrintedFrames, size: int | None) -> Draft | None:
@@ -114,7 +100,7 @@ def _reading_of_lines(lines: Sequence[str], stated: PrintedFrames, size: int | N
     empty = range(len(draft.names), draft.fit.count)
     names, units = ((*each, *[""] * len(empty)) for each in (draft.names, draft.units))
     draft = replace(draft, names=names, units=units, questions=[])
-    draft.be("no taxel", EMPTY, *empty)
+    draft.be("no taxel", "empty", *empty)
     return draft
 
 
@@ -124,5 +110,5 @@ def stated_count(stated: PrintedFrames, size: int | None) -> int | None:
         return len(stated.columns)
     if size is None or stated.frame_end is not None:
         return None
-    clocks = 0 if stated.time is None else 2 if "+" in stated.time else 1
+    clocks = 0 if stated.time in (None, "0") else 2 if "+" in (stated.time or "") else 1
     return size // (stated.frame_lines or 1) + clocks + len(stated.leave_out)

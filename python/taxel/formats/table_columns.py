@@ -55,9 +55,13 @@ class Draft:
     #: The column that names the sensor or the taxel of each line; rows and columns of taxels that two columns name.
     key: int | None = None
     size: tuple[int, int] | None = None
+    #: Number of lines of a frame, 0 if only an empty line, or one of text, shows it.
+    lines: int = 1
 
     def __post_init__(self) -> None:
         self.units = self.units or tuple(map(unit_of, self.names))
+        has_end = self.table.frame_end is not None or self.table.frame_begin is not None
+        self.lines = 0 if has_end else self.table.frame_lines or 1
         self.roles = [
             Role(name or f"column {k + 1}", self.fit.cells(k)[:FIRST], unit=unit)
             for k, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
@@ -118,10 +122,10 @@ class Draft:
         """Set keys of the table."""
         self.table = replace(self.table, **keys)
 
-    def form(self, said: Sequence[str], **of_frames: Any) -> Form:
+    def form(self, said: Sequence[str]) -> Form:
         """Return how lines are read by it."""
-        fit = self.fit
-        return Form(self.table, self.names, fit.first, tuple(said), fit.own, roles=self.roles, fit=fit, **of_frames)
+        fit, lines = self.fit, self.table.frame_lines or self.lines
+        return Form(self.table, self.names, fit.first, tuple(said), fit.own, lines, self.roles, fit)
 
 
 def time_of(draft: Draft, *, by_name: bool = False) -> int | None:

@@ -106,7 +106,8 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
     _frames(draft, lines, is_begin, begin, [unit for unit in units if unit])
     time = time_of(draft)
     _ask_of_thousands(draft, time)
-    is_laid_out = layout.rows is not None or layout.rate_hz is not None
+    # Lines of a live source arrive at a time.
+    is_laid_out = any(each is not None for each in (layout.rows, layout.rate_hz, layout.source))
     if time is None and draft.table.frame_time is None and not is_laid_out:
         _without_times(draft, text)
     find_taxels(draft)
@@ -367,11 +368,12 @@ def _begin_of_frames(lines: Sequence[str]) -> tuple[str, Sequence[str]]:
     return "", []
 
 
-def lines_between_blanks(fit: Fit, lines: Sequence[str], *, from_begin: bool) -> int:
+def _lines_between_blanks(draft: Draft, lines: Sequence[str]) -> int:
     """Return how many lines of numbers are between two empty lines each, 0 if that differs or none are.
 
-    What is behind the last may be a part, and so may what is before the first, unless lines are all `from_begin`.
+    What is behind the last may be a part, and so may what is before the first of a live source.
     """
+    fit, from_begin = draft.fit, draft.layout.source is None
     empty = np.cumsum([not line.strip(" \t\r,;") for line in lines])
     before = empty[[fit.lines[k][0] for k in fit.body]]
     ends = np.flatnonzero(np.diff(before)) + 1
@@ -379,19 +381,29 @@ def lines_between_blanks(fit: Fit, lines: Sequence[str], *, from_begin: bool) ->
     return sizes.pop() if len(ends) > 1 and len(sizes) == 1 else 0
 
 
+def find_blanks(draft: Draft, lines: Sequence[str]) -> None:
+    """Say how many lines a frame has, if empty lines show it."""
+    if (size := _lines_between_blanks(draft, lines)) > 1:
+        draft.set(frame_end="blank")
+        draft.lines = size
+        draft.said.append(f"{size} lines per frame, between empty lines")
+
+
 def _frames(draft: Draft, lines: Sequence[str], is_begin: Sequence[bool], begin: str, units: Sequence[str]) -> None:
     """Say how many lines a frame has: those between lines of text, or between empty lines."""
     if draft.is_stated("frame_lines", "frame_end", "frame_begin"):
+        is_blank = draft.table.frame_end is not None
+        draft.lines = _lines_between_blanks(draft, lines) if is_blank else draft.lines
         return
     if begin:
         first = min(is_begin.index(True), draft.fit.first)
         draft.set(frame_begin=begin, frame_time=next(iter(units), None), skip_lines=first)
+        draft.lines = 0
         draft.said.append(f"frames begin at lines {begin!r}")
         if len(units) > 1:
             draft.ask("the unit of the time", "frame_time", {unit: {"frame_time": unit} for unit in units})
-    elif (size := lines_between_blanks(draft.fit, lines, from_begin=True)) > 1:
-        draft.set(frame_end="blank")
-        draft.said.append(f"{size} lines per frame, between empty lines")
+    else:
+        find_blanks(draft, lines)
 
 
 def _without_times(draft: Draft, text: Text) -> None:
