@@ -21,7 +21,7 @@ from taxel.live.lines import first_lines
 from taxel.panel.look import Looks, layout_beside, picture
 from taxel.panel.shown_files import FileState, Opening, ShownFiles, state_of
 from taxel.panel.threads import in_thread
-from taxel.recording.kinds import FOREIGN, kind_of
+from taxel.recording.kinds import takes_layout
 
 #: Recordings and readouts in a list.
 _MOST_LISTED = 1000
@@ -173,7 +173,7 @@ class Folder:
         """
         path = self.file(name)
         out, own = (layout_beside(path, folder=each) for each in (folder, False))
-        if kind_of(path) not in FOREIGN:
+        if not takes_layout(path):
             raise ProblemError(f"{name}: states its sensor itself, so it needs no layout")
         read = self._opening.options_of(path).layout or (own if folder and own.exists() else None)
         if read is not None:

@@ -30,7 +30,7 @@ from taxel.formats.table_form import form_of
 from taxel.formats.times import ISO, UNITS_US
 from taxel.live.line_frames import array_of
 from taxel.live.stated_source import with_layout
-from taxel.recording.kinds import FOREIGN, kind_of
+from taxel.recording.kinds import kind_of, takes_layout
 from taxel.recording.opening import open_all, sensors
 
 #: So many columns are listed, answers assumed to show a reading, points of a curve, and sensors of a picture.
@@ -140,13 +140,13 @@ class Looks:
         """
         is_live = layout.source is not None
         kind = "table" if is_live else kind_of(path)
-        if kind not in FOREIGN:
+        if kind is None or not (is_live or takes_layout(path)):
             raise ProblemError(f"{path.name}: states its sensor itself, so no roles can be chosen")
         found = self._found(path, kind, layout)
         if changes:
             text = of_layout(found.changed(changes))
             found = self._found(path, kind, Layout.of_text(layout.path, text))
-        roles = _of_arrays(found) if kind == "arrays" else _of_columns(found, self._text(path))
+        roles = _of_columns(found, self._text(path)) if kind == "table" else _of_arrays(found, is_set=path.is_dir())
         listed = [k for k, role in enumerate(found.roles) if role.role != "taxel" or role.certainty == OPEN]
         taxels = [k for k, role in enumerate(found.roles) if k not in {*listed}]
         shown = sorted((listed + taxels[:64])[:_LISTED])
@@ -170,7 +170,7 @@ class Looks:
         return self._last[1]
 
     def _sheets(self, path: Path) -> list[str]:
-        return [] if path.suffix.lower() in ARRAYS else [*self._text(path).sheets]
+        return [] if path.suffix.lower() in ARRAYS or path.is_dir() else [*self._text(path).sheets]
 
     def _found(self, path: Path, kind: str, layout: Layout) -> Found:
         """Return how a file is read; each question that is open has its first answer in the whole."""
@@ -320,8 +320,8 @@ def _of_columns(found: Found, text: Text) -> Any:
     return of
 
 
-def _of_arrays(found: Found) -> Any:
-    """Return a function that returns an axis of the array of frames, or another array, as the page shows it."""
+def _of_arrays(found: Found, *, is_set: bool) -> Any:
+    """Return a function that returns an axis of the array of frames, another array, or a feature of a data set."""
     how = found.layout.data
     named = "" if how is None else how.axes or ""
     axes = named.split()
@@ -341,9 +341,10 @@ def _of_arrays(found: Found) -> Any:
         menu: dict[str, Changes] = {_LEFT: {"time": None}, "time": {"time": role.name, "time_unit": None}}
         if role.axis:
             menu = {word: {"axes": counting(k, word)} for word in AXES_OF_ARRAYS}
-        elif role.certainty == OPEN:
+        elif role.certainty == OPEN or (is_set and role.role != "time"):
             menu = {"frames": {"array": role.name}}
-        shown = "" if role.certainty == OPEN and not role.axis else role.role if role.role in menu else _LEFT
+        shown = "frames" if is_set and role.role == "taxel" else role.role if role.role in menu else _LEFT
+        shown = "" if role.certainty == OPEN and not role.axis else shown
         return asdict(role) | {"role": shown, "menu": menu, "units": {}, "curve": []}
 
     return of
@@ -352,6 +353,7 @@ def _of_arrays(found: Found) -> Any:
 def _fields(found: Found, kind: str, sheets: Sequence[str], path: Path) -> Iterator[dict[str, Any]]:
     """Yield what else can be said of a file: a choice of changes each, or a value of a key."""
     layout, table, data = found.layout, found.layout.table, found.layout.data
+    yield from (_choice(question.why, None, question.choices) for question in found.questions)
     is_timed = any(role.role == "time" and not role.axis for role in found.roles)
     if len(sheets) > 1 and table is not None:
         choices: dict[str, Changes] = {"all like the largest": {"sheet": None}, **{s: {"sheet": s} for s in sheets}}

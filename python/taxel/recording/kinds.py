@@ -237,6 +237,12 @@ def kind_of(path: Path) -> str | None:
     return next((name for name, kind in kinds() if kind.knows(path)), None)
 
 
+def takes_layout(path: Path) -> bool:
+    """Return whether a layout says what of a path is read: of a table, of arrays, of a data set that is a folder."""
+    kind = kind_of(path)
+    return kind in FOREIGN or (kind not in (None, "ros") and path.is_dir())
+
+
 def is_recording(path: Path, layout: GivenLayout = None) -> bool:
     """Return whether a path is a recording; what is damaged inside shows only when it is opened."""
     try:
