@@ -1,5 +1,6 @@
 """`make dist` builds a complete source package, and wheels that run without cargo and without the checkout."""
 
+import json
 import os
 import platform
 import re
@@ -161,6 +162,15 @@ def test_the_viewers_install_beside_the_wheel(tmp_path: Path) -> None:
         2,
         "taxel: rerun is not installed: pip install 'taxel[rerun]'\n",
     )
+
+
+def test_the_makers_formats_install_beside_the_wheel(tmp_path: Path) -> None:
+    bare = Bare(tmp_path)
+    the("taxel_makers-*.whl")
+    bare.install("--find-links", str(DIST), "taxel[makers]")
+    (tmp_path / "skin.tact").write_text("".join(f"{k % 2} {k % 80} {k / 100}\n" for k in range(99)))
+    ended = bare.run("taxel", "info", "skin.tact", "--json")
+    assert (ended.returncode, json.loads(ended.stdout)["kind"]) == (0, "neutouch"), ended.stderr
 
 
 def test_the_benchmarks_install_beside_the_wheel(tmp_path: Path) -> None:

@@ -118,7 +118,7 @@ class Reading:
         Layout file with the facts that a recording lacks: sensor, unit, rate, columns of a table. Default:
         NAME.layout.toml or layout.toml beside the recording.
     label_column : str, optional
-        Column of a table, or feature of a LeRobot data set, whose value becomes a label where it changes; it is no
+        Column of a table, or feature of a data set of robots, whose value becomes a label where it changes; it is no
         taxel.
 
     Examples

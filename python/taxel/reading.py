@@ -1,6 +1,7 @@
 """What a reader of files returns: facts, a table and marks of one source, and the view that a recording has of it.
 
-A reader of another format returns `InMemory`; `taxel.recording` looks at it through a `View`.
+A reader of another format returns `InMemory`; `taxel.recording` looks at it through a `View`. For readers of
+other distributions it has `Text`, which reads any encoding, and what makes errors with their place, as `unreadable`.
 
 Examples
 --------
@@ -19,6 +20,9 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.errors import damaged, refused, unreadable
+from taxel._base.messages import warn
+from taxel._base.table_text import Text, beginning, read_parquet, values_in
 from taxel.array import Array
 from taxel.clock import Clock
 from taxel.detections import Detections
@@ -36,10 +40,18 @@ __all__ = [
     "InMemory",
     "Marks",
     "Reader",
+    "Text",
     "View",
     "Zeroing",
     "after_zeros",
+    "beginning",
+    "damaged",
     "kind_of_file",
+    "read_parquet",
+    "refused",
+    "unreadable",
+    "values_in",
+    "warn",
 ]  # fmt: skip
 
 #: Converts times of one clock to those of another, us.
@@ -51,7 +63,6 @@ ENDINGS: dict[str, str] = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv"
 _LEAST = 2
 #: Kinds of files that are no recordings of one format.
 _OTHERS = {"arrays": "file of arrays", "records": "file of events", "table": "table", "ros": "ROS bag"}
-_OTHERS |= {"lerobot": "LeRobot data set", "neutouch": "NeuTouch recording"}
 
 
 def after_zeros(frames: Frames, seconds: float) -> Frames:
@@ -248,6 +259,8 @@ class Facts:
         The text of a layout file by which a table or array of another program was read, complete.
     roles : tuple of mapping
         What each column or axis of such a file is (`taxel.formats.roles.Role`).
+    episode : int, optional
+        The number of the trial in a data set, by whose tables detections are written.
     labels_of : str
         The quantity of plain rules whose thresholds its notes are, as they were derived from it; "" if they were not.
     """
@@ -272,6 +285,7 @@ class Facts:
     truncated: bool = False
     layout: str = ""
     roles: tuple[Mapping[str, Any], ...] = ()
+    episode: int | None = None
     labels_of: str = ""
 
     def __post_init__(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import socket
 import threading
 import tty
 from collections.abc import Iterator
@@ -53,16 +54,17 @@ def mat(rows: int, columns: int) -> Iterator[tuple[str, threading.Event]]:
 
 
 def connect(page: Any, port: object, rows: str, columns: str) -> None:
-    """Plug in a sensor in the dialog, once its lines look as they should; a pseudo-terminal is in no list of ports."""
+    """Plug in a sensor in the dialogs, by keys, once its lines look as they should."""
     press(page, "1")
     page.locator("#sensor-open").click()
-    until(lambda: page.locator("#sensor-port option").count() > 0, "the ports are listed")
-    page.locator("#sensor-port").evaluate("(list, port) => list.append(new Option(port, port))", str(port))
-    page.locator("#sensor-port").select_option(str(port))
-    until(lambda: page.locator("#sensor-rows").input_value() == rows, "the rows are guessed")
-    assert page.locator("#sensor-columns").input_value() == columns
-    page.locator("#sensor").get_by_role("button", name="Connect", exact=True).click()
-    until(lambda: page.locator("#sensor").is_hidden(), "it is connected")
+    page.locator("#sensor-place").fill(str(port))
+    page.locator("#sensor-place").press("Enter")
+    until(lambda: page.locator("#roles").is_visible(), "its lines are shown")
+    shape = page.locator("#roles-fields label", has_text="(a guess)").locator("input")
+    until(lambda: shape.count() == 2, "rows and columns are guessed")
+    assert [shape.nth(k).input_value() for k in range(2)] == [rows, columns]
+    page.locator("#roles-open").press("Enter")
+    until(lambda: page.locator("#roles").is_hidden(), "it is connected")
 
 
 def is_free(port: Path) -> bool:
@@ -106,3 +108,45 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
     verdict = taxel.open(tmp_path / "trial1.mcap").verdict
     assert verdict.noted["silences"] == 1
     assert verdict.noted["silent_ms"] >= 1000
+
+
+def test_what_a_server_prints_is_chosen_by_columns_on_a_phone(chromium: Any, tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server, followed(chromium, tmp_path, 0) as (_, page):
+        page.set_viewport_size({"width": 390, "height": 800})
+        place = "{}:{}".format(*server.getsockname())
+        over = threading.Event()
+
+        def send() -> None:
+            # One who looks, and one who receives.
+            while not over.is_set():
+                line, _ = server.accept()
+                with contextlib.suppress(OSError), line:
+                    for k in range(100_000):
+                        line.sendall(f"{k * 20},{k % 7},{k % 5},{k % 9},{k % 3},8\n".encode())
+                        if over.wait(0.02):
+                            return
+
+        thread = threading.Thread(target=send, daemon=True)
+        thread.start()
+        page.locator("#tab-board").click()
+        page.locator("#sensor-open").click()
+        page.locator("#sensor-place").fill(f"lines+tcp:{place}")
+        page.locator("#sensor-form button.primary").click()
+        until(lambda: page.locator("#roles-rows tr").count() == 6, "a row for each column")
+        assert page.evaluate("document.querySelector('#roles').scrollWidth <= window.innerWidth")
+        page.locator("#roles-rows tr").nth(5).locator("select").first.select_option("left out")
+        rows = page.locator("#roles-fields label", has_text="Rows").locator("input")
+        until(lambda: rows.input_value() == "2", "four taxels are left")
+        rows.fill("4")
+        rows.press("Tab")
+        columns = page.locator("#roles-fields label", has_text="Columns").locator("input")
+        until(lambda: columns.input_value() == "1", "columns are proposed")
+        until(lambda: page.locator("#roles-seen figure").count() == 1, "the map is drawn")
+        page.locator("#roles-open").click()
+        until(lambda: page.locator("#roles").is_hidden(), "it is connected")
+        shows(page, "pressure-top", "counts")
+        over.set()
+        page.locator("#sensor-open").click()
+        page.locator("#sensor-place").fill(f"lines:{tmp_path.parent / 'elsewhere.csv'}")
+        page.locator("#sensor-form button.primary").click()
+        shows(page, "sensor-about", "must be a file of the folder")

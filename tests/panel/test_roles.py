@@ -15,7 +15,11 @@ from tests.panel.protocol import Client
 
 import taxel
 from taxel import FormatError, ProblemError
+from taxel._base.table_text import Text
 from taxel.formats.layout import Layout, layout_name
+from taxel.formats.line_form import form_of_lines
+from taxel.formats.table_form import form_of
+from taxel.live.stated_source import StatedSource
 from taxel.panel import Panel
 from taxel.panel.folder import Folder
 from taxel.panel.look import Looks
@@ -76,6 +80,33 @@ def test_a_layout_is_written_over_another_only_if_asked(tmp_path: Path) -> None:
             assert page.ask("lay", **message)["type"] == "refused", wrong
         assert page.ask("look", name=path.name, changes={"__class__": 1})["type"] == "refused"
     assert sorted(each.name for each in tmp_path.iterdir()) == sorted([path.name, layout_name(path), "own.npz"])
+
+
+@pytest.mark.parametrize(
+    ("lines", "changes"),
+    [
+        ([f"{20 * k},{k % 7},{k % 5},{k % 9}" for k in range(60)], [{}]),
+        ([f"{20 * k},{k % 7},{k % 5},{k % 9}" for k in range(60)], [{"time_column": 0, "left": [1]}]),
+        ([f"{k % 7},{k % 5},{k % 9},1" for k in range(60)], [{"left": [4]}, {"rows": 3}]),
+        (["", *["1,2,3", "4,5,6", ""] * 20], [{"rows": 3}, {"unit": "N", "falls": True}]),
+        ([f'{{"t": {20 * k}, "p": [1, {k % 9}], "battery": 3}}' for k in range(60)], [{"time_unit": "us"}]),
+    ],
+)
+def test_a_live_source_reads_lines_as_they_were_looked_at(lines: list[str], changes: list[dict[str, Any]]) -> None:
+    looks, name = Looks(), "serial:/dev/ttyACM0,baud=9600"
+    looks.hear(name, lines)
+    path, layout = looks.heard(name)  # type: ignore[misc]
+    for change in [{}, *changes]:
+        message, whole = looks.look(path, layout, change, name)
+        layout = Layout.of_text(layout.path, message["text"])
+    stated = StatedSource.of(looks.source(name, message["text"]))
+    form, full = form_of(Text(path), whole)  # type: ignore[arg-type]
+    size = None if stated.array is None else stated.array.taxels
+    live = form_of_lines(lines, stated.printed, size, lambda *_: "")
+    assert live is not None
+    assert (live.taxels, live.clocks, live.table.frame_end) == (form.taxels, form.clocks, form.table.frame_end)
+    assert (stated.printed.baud, stated.unit) == (9600, full.unit)
+    assert (None if stated.array is None else stated.array.shape[0]) == full.rows
 
 
 def test_a_strangers_file_is_not_looked_at_while_a_recording_runs(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ from taxel.cli._say import say
 from taxel.cli._task import OutOption, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import App, Flat
 from taxel.detections import Detections
-from taxel.formats.lerobot import check_target
 from taxel.options import DetectOptions, Reading
 from taxel.spikes import to_ms
 
@@ -67,19 +66,19 @@ def detect(
     lists
         Print all detections. Default: the first 40 of each recording, and with --truth none.
     out
-        Write the detections to this .csv; those in a data set of LeRobot, by frames of its episodes, or to a .parquet.
+        Write the detections to this .csv; those in a data set of robots, by frames of its episodes, or to a .parquet.
     report
         Write a report to this folder, with potential, weights, errors and the worst events.
     """
     output.check(out)
     output.check_report(report)
-    check_target(out, recordings)
     given = one_or_several(truth) if truth else None
     loaded = taxel.detect.load(readout)
     with progress(output.json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
             opened = reading.open_sensors(recordings)
+        _check_target(out, opened)
         found = taxel.tasks.detect(loaded, opened, given, options, progress=update, workers=workers)
         found = replace(found, warnings=(*unread, *found.warnings))
     used = loaded.using(options.use) if isinstance(loaded, taxel.Readout) else loaded
@@ -106,6 +105,21 @@ def detect(
             overwrite=output.overwrite,
         )
         say(*[] if output.json else [f"report: {place}"])
+
+
+def _check_target(file: Path | None, recordings: Sequence[taxel.Recording]) -> None:
+    """Refuse to write a table of detections into a data set, or as Parquet if it is of anything else.
+
+    Raises
+    ------
+    ProblemError : it is so
+    """
+    if file is None:
+        return
+    if file.suffix.lower() == ".parquet" and any(each.episode is None for each in recordings):
+        raise taxel.ProblemError(f"{file}: is only for detections in a data set of robots; write a .csv")
+    if any(each.episode is not None and each.path.absolute() in file.absolute().parent.parents for each in recordings):
+        raise taxel.ProblemError(f"{file}: is among the tables of a data set; write it elsewhere")
 
 
 def _lines(

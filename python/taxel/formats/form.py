@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -52,9 +52,7 @@ class Form:
     own : tuple of str
         The names of the cells that lines have themselves, in whose order they are put; empty if they have none.
     lines : int
-        Number of lines of a frame of a live source, 0 if only an empty line shows it.
-    keys : mapping
-        What was understood beyond what is stated of a live source, as its keys.
+        Number of lines of a frame, 0 if only an empty line, or one of text, shows it.
     roles : sequence of Role
         Of each column.
     fit : Fit, optional
@@ -67,7 +65,6 @@ class Form:
     said: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
     lines: int = 1
-    keys: Mapping[str, str] = field(default_factory=dict)
     roles: Sequence[Role] = ()
     fit: Fit | None = None
 

@@ -115,19 +115,23 @@ class Table:
         text("lines", self.lines, KINDS)
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         integer("skip_lines", self.skip_lines, 0)
-        _check_columns(self, "time_column", "label_column", "by", "taxel_column", "leave_out")
+        _check_columns(self, "time_column", "label_column", "by", "taxel_column", "columns", "leave_out")
         for name in ("keep", "sheet", "frame_begin"):
             if getattr(self, name) is not None:
                 text(name, getattr(self, name))
         for cell in self.missing_texts:
             text("missing", cell)
-        for column in several("columns", self.columns):
-            text("columns", column)
         if self.frame_time is not None and text("frame_time", self.frame_time, UNITS_US) and self.frame_begin is None:
             raise refused("frame_time", " is given without frame_begin, the line that states it")
         if self.frame_begin is not None and not self.frame_begin.strip():
             raise refused("frame_begin", f" is {shown(self.frame_begin)}: must be a text")
-        _check_end(self)
+        if self.frame_lines is not None:
+            integer("frame_lines", self.frame_lines, 1, 65_535)
+        if self.frame_end is not None:
+            text("frame_end", self.frame_end, ("blank",))
+        given = [name for name in ("frame_begin", "frame_end", "frame_lines") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise refused(given[0], f" is given together with {given[1]}: give only one of them")
         if flag("events", self.events) and (self.time_column is None or self.has_lines):
             raise refused("events", " is true: the table must have a time_column, and a line for each event")
 
@@ -144,18 +148,6 @@ class Table:
     def keeps(self, name: str) -> bool:
         """Whether a column of this name may be a taxel."""
         return self.keep is None or fnmatchcase(name, self.keep)
-
-
-def _check_end(how: Table | PrintedFrames) -> None:
-    """Refuse a table that does not state in one way where a frame of several lines ends."""
-    if how.frame_lines is not None:
-        integer("frame_lines", how.frame_lines, 1, 65_535)
-    if how.frame_end is not None:
-        text("frame_end", how.frame_end, ("blank",))
-    names = ("frame_begin", "frame_end", "frame_lines")
-    given = [name for name in names if getattr(how, name, None) is not None]
-    if len(given) > 1:
-        raise refused(given[0], f" is given together with {given[1]}: give only one of them")
 
 
 def _check_columns(how: Any, *keys: str) -> None:
@@ -202,8 +194,8 @@ class Data:
         if self.axes is not None:
             named = text("axes", self.axes).split()
             once = {"column" if name == "taxel" else name for name in named}
-            if len(once) < len(named) or "time" not in named or not set(named) <= set(_AXES_OF_ARRAYS):
-                others = f"time and others of {', '.join(_AXES_OF_ARRAYS)}, taxel without column"
+            if len(once) < len(named) or "time" not in named or not set(named) <= set(AXES_OF_ARRAYS):
+                others = f"time and others of {', '.join(AXES_OF_ARRAYS)}, taxel without column"
                 raise refused("axes", f" is {shown(self.axes)}: must be {others}")
 
 
@@ -218,7 +210,7 @@ class PrintedFrames:
     baud : int, optional
         Baud rate of a serial line.
     time : str, optional
-        "t:ms", "1+2" ...; default: the time of arrival.
+        "t:ms", "1+2" ..., or "0", the time of arrival; default: a column that looks like it, else that of arrival.
     columns, leave_out : list of str or int
         The names of the columns; those without values.
     frame_lines : int, 1 or more, optional
@@ -245,8 +237,21 @@ class PrintedFrames:
                 raise refused(name, f" is {shown(getattr(self, name))}: must not contain a comma")
         if self.baud is not None:
             integer("baud", self.baud, 1)
-        _check_end(self)
-        _check_columns(self, "columns", "leave_out")
+        _ = self.layout
+
+    @property
+    def layout(self) -> Layout:
+        """The same as the layout of a table of these lines."""
+        time, _, unit = (self.time or "").partition(":")
+        table = Table(
+            columns=self.columns,
+            leave_out=self.leave_out,
+            time_column=0 if time == "0" else time or None,
+            time_unit=unit or "s",
+            frame_lines=self.frame_lines,
+            frame_end=self.frame_end,
+        )
+        return Layout(Path(self.place), source=self, table=table, stated=frozenset(["time_unit"] if unit else []))
 
 
 @dataclass(frozen=True)
@@ -489,7 +494,7 @@ _TABLES: dict[str, type[Any]] = {
 
 
 #: What axes of an array may count.
-_AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
+AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
 
 
 def _known(table: str, values: Mapping[str, Any]) -> None:

@@ -67,6 +67,12 @@ class Fit:
         """The number of the first line of numbers, from 0."""
         return self.lines[self.body[0]][0]
 
+    @property
+    def own(self) -> tuple[str, ...]:
+        """The names that cells of its lines have themselves, in the order of the columns; empty if they have none."""
+        names = self.lines[self.body[0]][1].names
+        return names if self.kind in ("marked", "json") and any(names) else ()
+
     @cached_property
     def _columns(self) -> list[tuple[str, ...]]:
         return list(zip(*(self.lines[k][1].cells for k in self.body), strict=True))
@@ -97,8 +103,7 @@ class Fit:
     def over(self, lines: Iterable[str]) -> Fit:
         """Return the same with lines over the rest of the file, those that have as many cells."""
         read = (read_line(line, self.kind, self.separator, self.decimal) for line in lines)
-        names = self.lines[self.body[0]][1].names
-        whole = (line.in_order(names).cells for line in read if line is not None)
+        whole = (line.in_order(self.own).cells for line in read if line is not None)
         return replace(self, spread=[cells for cells in whole if len(cells) == self.count])
 
     def ascends(self, column: int) -> bool:

@@ -93,9 +93,7 @@ class Rows:
         self.beside = self.beside.iloc[rows].reset_index(drop=True)
 
 
-def read_table(
-    path: Path, layout: Layout, array: Array | None = None, label_column: str | int | None = None
-) -> list[InMemory]:
+def read_table(path: Path, layout: Layout, array: Array | None = None) -> list[InMemory]:
     """Return a reader of each source of a table of frames, or of events.
 
     Parameters
@@ -105,8 +103,6 @@ def read_table(
         What it does not say of a table is found in the text, if it has no [table].
     array : Array, optional
         The sensor of events, where the layout does not say it; default: one large enough for them.
-    label_column : str or int, optional
-        The column whose value becomes a label where it changes, instead of that of the layout.
 
     Raises
     ------
@@ -115,7 +111,7 @@ def read_table(
     """
     parts, others = parts_of(Text(path), layout.table)
     more = [f"other sheets: {', '.join(others)}"] * bool(others)
-    return [each for name, text in parts.items() for each in _read_part(name, text, layout, array, label_column, more)]
+    return [each for name, text in parts.items() for each in _read_part(name, text, layout, array, more)]
 
 
 def _read_part(
@@ -123,12 +119,11 @@ def _read_part(
     text: Text,
     layout: Layout,
     array: Array | None,
-    label_column: str | int | None,
     more: Sequence[str],
 ) -> list[InMemory]:
     """Return a reader of each source of one of the tables of a file; `more` is what of the file is not read."""
     path = text.path
-    form, full = form_of(text, layout, label_column)
+    form, full = form_of(text, layout)
     how, columns, sources = form.table, form.columns, dict[str, Frames | Events]()
     rows = read_rows(text, form)
     read = {*columns.times, columns.label, columns.by, *columns.taxel, *columns.taxels}

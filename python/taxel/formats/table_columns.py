@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel._base.table_text import Text
 from taxel.formats.column_names import FORCES, OTHER_UNITS, axes_of, is_time, says, time_unit, unit_of
-from taxel.formats.form import left_out, places_of
+from taxel.formats.form import Form, left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
@@ -55,9 +55,13 @@ class Draft:
     #: The column that names the sensor or the taxel of each line; rows and columns of taxels that two columns name.
     key: int | None = None
     size: tuple[int, int] | None = None
+    #: Number of lines of a frame, 0 if only an empty line, or one of text, shows it.
+    lines: int = 1
 
     def __post_init__(self) -> None:
         self.units = self.units or tuple(map(unit_of, self.names))
+        has_end = self.table.frame_end is not None or self.table.frame_begin is not None
+        self.lines = 0 if has_end else self.table.frame_lines or 1
         self.roles = [
             Role(name or f"column {k + 1}", self.fit.cells(k)[:FIRST], unit=unit)
             for k, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
@@ -117,6 +121,11 @@ class Draft:
     def set(self, **keys: Any) -> None:
         """Set keys of the table."""
         self.table = replace(self.table, **keys)
+
+    def form(self, said: Sequence[str]) -> Form:
+        """Return how lines are read by it."""
+        fit, lines = self.fit, self.table.frame_lines or self.lines
+        return Form(self.table, self.names, fit.first, tuple(said), fit.own, lines, self.roles, fit)
 
 
 def time_of(draft: Draft, *, by_name: bool = False) -> int | None:
@@ -569,7 +578,7 @@ def said_of(draft: Draft, time: int | None) -> Iterator[str]:
     table = draft.table
     marks = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks", "|": "bars"}
     kinds = {"marked": "marks and names between cells", "json": "lines of JSON", "hex": "hexadecimal"}
-    if draft.layout.table is None:
+    if draft.layout.table is None or draft.layout.source is not None:
         yield kinds.get(table.lines, f"separated by {marks.get(table.separator, table.separator)}")
         if table.decimal == ",":
             yield "decimal commas"

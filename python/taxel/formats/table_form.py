@@ -53,15 +53,13 @@ _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 _COMMENT = re.compile(r"(?:#+|(?:[%;!*]|//)+(?=\s|$))\s*")
 
 
-def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -> tuple[Form, Layout]:
+def form_of(text: Text, layout: Layout) -> tuple[Form, Layout]:
     """Return how a table is read, as its layout says, or, if it says nothing of the table, as its first lines look.
 
     Parameters
     ----------
     text : Text
     layout : Layout
-    label_column : str or int, optional
-        As of `taxel.formats.layout.Table`.
 
     Returns
     -------
@@ -74,8 +72,6 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     FormatError : no table of numbers, one that the layout does not fit, or two readings that fit about equally (prints
         the layout of each)
     """
-    if label_column is not None:
-        layout = replace(layout, table=replace(layout.table or Table(), label_column=label_column))
     try:
         form, full = _found(text, layout)
         if not form.taxels:
@@ -85,11 +81,6 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     except ProblemError as error:
         raise unreadable(first_line(error), text.path) from None
     return form, full
-
-
-def _own(how: Table, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names that lines of a table have themselves."""
-    return names if how.lines in ("marked", "json") and not how.columns and any(names) else ()
 
 
 def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
@@ -115,7 +106,8 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
     _frames(draft, lines, is_begin, begin, [unit for unit in units if unit])
     time = time_of(draft)
     _ask_of_thousands(draft, time)
-    is_laid_out = layout.rows is not None or layout.rate_hz is not None
+    # Lines of a live source arrive at a time.
+    is_laid_out = any(each is not None for each in (layout.rows, layout.rate_hz, layout.source))
     if time is None and draft.table.frame_time is None and not is_laid_out:
         _without_times(draft, text)
     find_taxels(draft)
@@ -139,9 +131,8 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
         right = "write them as 2024-05-01T10:00:00.25, or state rate_hz and leave_out in a layout file"
         raise unreadable(f"column {unread[0]} has times in a form that taxel does not read; {right}", text.path)
     refuse_open(text.path, "can be read in", full, draft.roles, draft.questions)
-    how = full.table or draft.table
-    said = (*said_of(draft, time), *draft.said)
-    return Form(how, draft.names, draft.fit.first, said, _own(how, draft.names), roles=draft.roles, fit=draft.fit), full
+    draft.table = full.table or draft.table
+    return draft.form((*said_of(draft, time), *draft.said)), full
 
 
 def _draft(text: Text, layout: Layout, lines: Sequence[str]) -> Draft:
@@ -236,11 +227,10 @@ def _called(fit: Fit, lines: Sequence[str], layout: Layout) -> Draft:
     table = replace(layout.table or Table(), **keys, lines=fit.kind, skip_lines=fit.first)
     if fit.kind != "plain":
         table = replace(table, separator=fit.separator if fit.kind == "hex" else ",")
-        own = fit.lines[fit.body[0]][1].names
         # The places in a list are no names.
-        own = () if all(map(_PLACE_IN_LIST.fullmatch, own)) else own
-        names = own if any(own) else _names_above_marks(fit, lines)
-        if not any(own) and any(names):
+        own = () if all(map(_PLACE_IN_LIST.fullmatch, fit.own)) else fit.own
+        names = own or _names_above_marks(fit, lines)
+        if not own and any(names):
             table = replace(table, columns=list(names))
         return Draft(fit, table, names, (), layout)
     real = fit.count
@@ -378,11 +368,12 @@ def _begin_of_frames(lines: Sequence[str]) -> tuple[str, Sequence[str]]:
     return "", []
 
 
-def lines_between_blanks(fit: Fit, lines: Sequence[str], *, from_begin: bool) -> int:
+def _lines_between_blanks(draft: Draft, lines: Sequence[str]) -> int:
     """Return how many lines of numbers are between two empty lines each, 0 if that differs or none are.
 
-    What is behind the last may be a part, and so may what is before the first, unless lines are all `from_begin`.
+    What is behind the last may be a part, and so may what is before the first of a live source.
     """
+    fit, from_begin = draft.fit, draft.layout.source is None
     empty = np.cumsum([not line.strip(" \t\r,;") for line in lines])
     before = empty[[fit.lines[k][0] for k in fit.body]]
     ends = np.flatnonzero(np.diff(before)) + 1
@@ -390,19 +381,29 @@ def lines_between_blanks(fit: Fit, lines: Sequence[str], *, from_begin: bool) ->
     return sizes.pop() if len(ends) > 1 and len(sizes) == 1 else 0
 
 
+def find_blanks(draft: Draft, lines: Sequence[str]) -> None:
+    """Say how many lines a frame has, if empty lines show it."""
+    if (size := _lines_between_blanks(draft, lines)) > 1:
+        draft.set(frame_end="blank")
+        draft.lines = size
+        draft.said.append(f"{size} lines per frame, between empty lines")
+
+
 def _frames(draft: Draft, lines: Sequence[str], is_begin: Sequence[bool], begin: str, units: Sequence[str]) -> None:
     """Say how many lines a frame has: those between lines of text, or between empty lines."""
     if draft.is_stated("frame_lines", "frame_end", "frame_begin"):
+        is_blank = draft.table.frame_end is not None
+        draft.lines = _lines_between_blanks(draft, lines) if is_blank else draft.lines
         return
     if begin:
         first = min(is_begin.index(True), draft.fit.first)
         draft.set(frame_begin=begin, frame_time=next(iter(units), None), skip_lines=first)
+        draft.lines = 0
         draft.said.append(f"frames begin at lines {begin!r}")
         if len(units) > 1:
             draft.ask("the unit of the time", "frame_time", {unit: {"frame_time": unit} for unit in units})
-    elif (size := lines_between_blanks(draft.fit, lines, from_begin=True)) > 1:
-        draft.set(frame_end="blank")
-        draft.said.append(f"{size} lines per frame, between empty lines")
+    else:
+        find_blanks(draft, lines)
 
 
 def _without_times(draft: Draft, text: Text) -> None:

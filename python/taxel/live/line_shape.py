@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taxel._base.messages import counted, first_line, plain
 from taxel._base.text_lines import ArrivedLine
-from taxel._core import ProblemError
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.form import Form
 from taxel.formats.line_form import form_of_lines, stated_count
@@ -206,7 +206,7 @@ class LineShape:
         size = None if self.array is None or self._is_row else self.array.taxels
         try:
             return form_of_lines(texts, self._stated.printed, size, unit_of, are_taxels=not self._is_row)
-        except ProblemError as error:
+        except (ProblemError, FormatError) as error:
             raise self._refused(f": {first_line(error)}") from None
 
     def layout(self, readout_unit: str | None) -> dict[str, Any]:

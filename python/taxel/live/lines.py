@@ -19,7 +19,7 @@ from taxel.live.line_input import LineInput
 from taxel.live.line_shape import LineShape, numbers_of, texts_of
 from taxel.live.stated_source import StatedSource
 
-__all__ = ["Lines", "preview"]
+__all__ = ["Lines", "first_lines"]
 
 #: So many lines show what they are, or those of so long after the first, s.
 _LINES, _MEASURE_S = 33, 1.0
@@ -292,8 +292,8 @@ def _ends_in_number(text: str) -> bool:
     return is_number(last) and abs(float(last)) <= VALUE
 
 
-def preview(source: str, most_s: float) -> tuple[list[str], str, str]:
-    """Return the last lines that arrive from a source, what they seem to be, and the source with that added.
+def first_lines(source: str, most_s: float) -> list[str]:
+    """Return the first lines that arrive from a source.
 
     Parameters
     ----------
@@ -304,6 +304,7 @@ def preview(source: str, most_s: float) -> tuple[list[str], str, str]:
     Raises
     ------
     OSError : it cannot be opened
+    ProblemError : none of numbers arrives
     """
     lines = Lines(StatedSource.of(source), is_read_out=True)
     until = time.monotonic() + most_s
@@ -312,19 +313,7 @@ def preview(source: str, most_s: float) -> tuple[list[str], str, str]:
             lines._read()
     finally:
         lines.close()
-    shown = [line.text[:200] for line in lines._waiting][-12:]
-    shape = lines.shape
-    try:
-        form = shape.form_of([line.text for line in texts_of(lines._waiting)], texts_of(lines._waiting))
-        if form is None:
-            raise ProblemError(f"source {source!r}: no line contains only numbers")
-        shape.take(form)
-    except ProblemError as error:
-        reason = "Nothing arrived: is the sensor connected and switched on?"
-        return shown, str(error) if shown else reason, source
-    assert shape.array is not None
-    keys = {"array": f"{shape.array.rows}x{shape.array.columns}"} if lines.stated.array is None else {}
-    keys |= dict(form.keys)
-    text = ",".join([source, *(f"{key}={value}" for key, value in keys.items())])
-    about = f"{counted(len(form.taxels), 'number')} per line: {shape.array.rows} x {shape.array.columns}"
-    return shown, "; ".join([about, *form.said]), text
+    if not numbers_of(lines._waiting):
+        shown = "".join(f"; it prints {line.text[:60]!r}" for line in lines._waiting[-1:])
+        raise ProblemError(f"No numbers arrived: is the sensor connected and switched on?{shown}")
+    return [line.text for line in texts_of(lines._waiting)]

@@ -10,10 +10,12 @@ from taxel._base.arguments import shown
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, of_size
+from taxel.formats.form import Form
 from taxel.formats.layout import Layout, PrintedFrames
+from taxel.live.line_frames import array_of
 from taxel.wire import Registers
 
-__all__ = ["StatedSource"]
+__all__ = ["StatedSource", "with_layout"]
 
 #: How a source is written, for errors.
 _FORMS = (
@@ -153,6 +155,34 @@ class StatedSource:
     def registers(self, array: Array) -> Registers:
         """Return the registers of a board."""
         return Registers._of(_core.registers_preset(self.preset, array), array)
+
+
+def with_layout(source: str, form: Form, layout: Layout) -> str:
+    """Return a source with what a layout states of its lines, which a form reads.
+
+    Raises
+    ------
+    ProblemError : frames begin at a line of text
+    """
+    table, columns = form.table, form.columns
+    if table.frame_begin is not None:
+        raise ProblemError(
+            "frames that begin at a line of text are read of files alone: print an empty line after each"
+        )
+    array = layout.grid() or (array_of(form, None, None, "")[0] if form.lines > 1 else None)
+    times = "+".join(str(k + 1) for k in columns.times)
+    left = (k for k in range(len(form.names)) if k not in {*columns.times, *columns.taxels})
+    keys = {
+        "time": f"{times}:{table.time_unit}".removesuffix(":s" * (len(columns.times) > 1)) if times else "0",
+        "leave_out": ":".join(str(k + 1) for k in left),
+        "frame_lines": table.frame_lines,
+        "frame_end": table.frame_end,
+        "array": None if array is None else f"{array.rows}x{array.columns}",
+        "unit": layout.unit,
+        "falls": "true" if layout.falls is True else layout.turned,
+        "rate": layout.rate_hz,
+    }
+    return ",".join([source, *(f"{key}={value}" for key, value in keys.items() if value)])
 
 
 def _is_port(text: str) -> bool:

@@ -17,10 +17,11 @@ from taxel._core import ProblemError
 from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
 from taxel.formats.roles import Changes
-from taxel.panel.look import Looks, layout_beside
+from taxel.live.lines import first_lines
+from taxel.panel.look import Looks, layout_beside, picture
 from taxel.panel.shown_files import FileState, Opening, ShownFiles, state_of
 from taxel.panel.threads import in_thread
-from taxel.recording.kinds import FOREIGN, kind_of
+from taxel.recording.kinds import takes_layout
 
 #: Recordings and readouts in a list.
 _MOST_LISTED = 1000
@@ -131,10 +132,35 @@ class Folder:
 
     def look(self, name: str, text: str | None, changes: Changes) -> tuple[dict[str, Any], Layout | None]:
         """Return what a file is by a layout as text, or by its own, that is changed: as `Looks.look`."""
-        path = self.file(name)
+        path, layout = self.looks.heard(name) or (self.file(name), None)
         self.files.check(path)
-        layout = self._opening.layout_of(path)
-        return self.looks.look(path, layout if text is None else Layout.of_text(layout.path, text), changes)
+        layout = layout or self._opening.layout_of(path)
+        return self.looks.look(path, layout if text is None else Layout.of_text(layout.path, text), changes, name)
+
+    def seen(self, name: str, layout: Layout) -> dict[str, Any]:
+        """Return the picture of a file by its whole layout."""
+        heard = self.looks.heard(name)
+        return picture(self.file(name) if heard is None else heard[0], layout, name)
+
+    def hear(self, place: str, baud: int, most_s: float) -> str:
+        """Read the first lines of a place that a person types; return it as a source.
+
+        A place is a serial port or server, a file of the folder, a pipe, or KIND:PLACE of lines.
+
+        Raises
+        ------
+        OSError : it cannot be opened
+        ProblemError : a file elsewhere, or no lines of numbers
+        """
+        kind, _, where = place.partition(":")
+        file = self.path / (where if kind == "lines" else place)
+        source = place if kind in ("lines+tcp", "lines+udp") else f"serial:{place},baud={baud}"
+        if kind == "lines" or file.is_file() or file.is_fifo():
+            if not file.is_fifo() and self.path.resolve() not in file.resolve().parents:
+                raise refused("place", f" is {place}: must be a file of the folder, a pipe, a port, or HOST:PORT")
+            source = f"lines:{file}"
+        self.looks.hear(source, first_lines(source, most_s))
+        return source
 
     def lay(self, name: str, text: str, *, folder: bool, replace: bool) -> None:
         """Write a layout file beside a recording, or for all recordings of its folder.
@@ -147,7 +173,7 @@ class Folder:
         """
         path = self.file(name)
         out, own = (layout_beside(path, folder=each) for each in (folder, False))
-        if kind_of(path) not in FOREIGN:
+        if not takes_layout(path):
             raise ProblemError(f"{name}: states its sensor itself, so it needs no layout")
         read = self._opening.options_of(path).layout or (own if folder and own.exists() else None)
         if read is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -11,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.arguments import integer
 from taxel._base.arrays import ARRAYS, shapes
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, first_line
@@ -18,14 +21,16 @@ from taxel._base.table_text import Text
 from taxel._core import Error, FormatError, ProblemError
 from taxel.formats.column_names import AXES
 from taxel.formats.form import Form
-from taxel.formats.layout import Data, Layout, Table, layout_name
+from taxel.formats.layout import AXES_OF_ARRAYS, Data, Layout, PrintedFrames, Table, layout_name
 from taxel.formats.layout_text import changed, of_layout, without
 from taxel.formats.line_fits import Fit
 from taxel.formats.parts import parts_of
 from taxel.formats.roles import OPEN, Changes, OpenRolesError, Question, Role
 from taxel.formats.table_form import form_of
 from taxel.formats.times import ISO, UNITS_US
-from taxel.recording.kinds import FOREIGN, kind_of
+from taxel.live.line_frames import array_of
+from taxel.live.stated_source import with_layout
+from taxel.recording.kinds import kind_of, takes_layout
 from taxel.recording.opening import open_all, sensors
 
 #: So many columns are listed, answers assumed to show a reading, points of a curve, and sensors of a picture.
@@ -40,8 +45,6 @@ _KEYS: dict[str, tuple[str, int | None]] = {
     "taxel's name": ("taxel_column", None),
 }
 _LEFT = "left out"
-#: What an axis of an array may count.
-_AXES = ("time", "trial", "row", "column", "taxel", "axis")
 #: What a change may name.
 _MAY = {key.name for kind in (Table, Data) for key in fields(kind)}
 _MAY |= {"left", "read", "rows", "columns", "unit", "falls", "rate_hz", "axis"}
@@ -56,6 +59,14 @@ class Found:
     questions: Sequence[Question]
     whole: Layout | None
     form: Form | None = None
+
+    @property
+    def taxels(self) -> int:
+        """How many taxels a frame has; 0 where that does not show."""
+        if self.form is not None:
+            return len(self.form.taxels) * self.form.lines
+        inner = [int(role.first[0]) for role in self.roles if role.axis and role.role in ("row", "column", "taxel")]
+        return math.prod(inner) if inner else 0
 
     @property
     def stated(self) -> Layout:
@@ -74,18 +85,52 @@ class Found:
             raise refused("changes", f": {sorted(wrong)[0]!r} must be as `look` offers it")
         size = {key: changes[key] for key in ("rows", "columns") if not isinstance(changes.get(key, ()), Sequence)}
         others = {key: value for key, value in changes.items() if key not in size}
+        for key, other in (("rows", "columns"), ("columns", "rows")):
+            if len(size) == 1 and key in size and self.taxels:
+                size[other] = None if size[key] is None else self.taxels // integer(key, size[key], 1)
+                if size[other] is not None and size[other] * size[key] != self.taxels:
+                    raise refused("changes", f": {self.taxels} taxels are not {size[key]} {key} of as many each")
         said = {*others} | ({"leave_out"} if {"left", "read"} & {*others} else set())
         layout = changed(replace(self.layout, **size), others)
         return without(layout, _keys_of([each for each in self.questions if not each.keys & said]) - said)
 
 
 class Looks:
-    """Look at files of strangers; the text of the last one is kept."""
+    """Look at files of strangers, and at the first lines of live sources; the text of the last one is kept."""
 
     def __init__(self) -> None:
         self._last: tuple[object, Text] | None = None
+        #: The folder with the first lines of the last live source, by its text.
+        self._heard: dict[str, tempfile.TemporaryDirectory[str]] = {}
 
-    def look(self, path: Path, layout: Layout, changes: Changes) -> tuple[dict[str, Any], Layout | None]:
+    def hear(self, source: str, lines: Sequence[str]) -> None:
+        """Keep the first lines of a live source as a file that `look` looks at."""
+        self._heard = {source: tempfile.TemporaryDirectory(prefix="taxel-")}
+        Path(self._heard[source].name, "lines.txt").write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+
+    def heard(self, name: str) -> tuple[Path, Layout] | None:
+        """Return the file of the first lines of a live source, and a layout that says so; None of another name."""
+        if name not in self._heard:
+            return None
+        path = Path(self._heard[name].name, "lines.txt")
+        return path, Layout(path.with_suffix(".layout.toml"), source=PrintedFrames(name.partition(",")[0]))
+
+    def source(self, name: str, text: str) -> str:
+        """Return a live source that was heard with what a layout states of it.
+
+        Raises
+        ------
+        ProblemError : nothing was heard of it, or something is open
+        """
+        if (heard := self.heard(name)) is None:
+            raise refused("source", ": its lines were not looked at")
+        form, _, whole = self._read(heard[0], "table", Layout.of_text(heard[1].path, text))
+        assert form is not None  # it is a table
+        return with_layout(name, form, whole)
+
+    def look(
+        self, path: Path, layout: Layout, changes: Changes, name: str | None = None
+    ) -> tuple[dict[str, Any], Layout | None]:
         """Return what the message `look` says of a file by a layout that is changed, and the whole layout.
 
         Raises
@@ -93,27 +138,28 @@ class Looks:
         FormatError : it cannot be read so, whatever the answers to what is open
         ProblemError : it states its sensor itself; a change that makes no sense
         """
-        kind = kind_of(path)
-        if kind not in FOREIGN:
+        is_live = layout.source is not None
+        kind = "table" if is_live else kind_of(path)
+        if kind is None or not (is_live or takes_layout(path)):
             raise ProblemError(f"{path.name}: states its sensor itself, so no roles can be chosen")
         found = self._found(path, kind, layout)
         if changes:
             text = of_layout(found.changed(changes))
             found = self._found(path, kind, Layout.of_text(layout.path, text))
-        roles = _of_arrays(found) if kind == "arrays" else _of_columns(found, self._text(path))
+        roles = _of_columns(found, self._text(path)) if kind == "table" else _of_arrays(found, is_set=path.is_dir())
         listed = [k for k, role in enumerate(found.roles) if role.role != "taxel" or role.certainty == OPEN]
         taxels = [k for k, role in enumerate(found.roles) if k not in {*listed}]
         shown = sorted((listed + taxels[:64])[:_LISTED])
         return {
             "type": "look",
-            "name": path.name,
+            "name": name or path.name,
             "text": of_layout(found.stated),
             "roles": [roles(k) for k in shown],
             "more": len(found.roles) - len(shown),
             "questions": [{"why": each.why, "choices": dict(each.choices)} for each in found.questions],
             "fields": [*_fields(found, kind, self._sheets(path), path)],
             "said": [] if found.form is None else list(found.form.said),
-            "files": [layout_beside(path, folder=folder).name for folder in (False, True)],
+            "files": [] if is_live else [layout_beside(path, folder=folder).name for folder in (False, True)],
         }, found.whole
 
     def _text(self, path: Path) -> Text:
@@ -124,7 +170,7 @@ class Looks:
         return self._last[1]
 
     def _sheets(self, path: Path) -> list[str]:
-        return [] if path.suffix.lower() in ARRAYS else [*self._text(path).sheets]
+        return [] if path.suffix.lower() in ARRAYS or path.is_dir() else [*self._text(path).sheets]
 
     def _found(self, path: Path, kind: str, layout: Layout) -> Found:
         """Return how a file is read; each question that is open has its first answer in the whole."""
@@ -164,9 +210,9 @@ class Looks:
         return None, [Role(**role) for role in facts.roles], Layout.of_text(layout.path, facts.layout)
 
 
-def picture(path: Path, layout: Layout) -> dict[str, Any]:
+def picture(path: Path, layout: Layout, name: str) -> dict[str, Any]:
     """Return what the message `seen` says of a file by its whole layout: the sensors, and a curve and a map of each."""
-    message: dict[str, Any] = {"type": "seen", "name": path.name, "sensors": [], "said": []}
+    message: dict[str, Any] = {"type": "seen", "name": name, "sensors": [], "said": []}
     try:
         with collected() as said:
             recordings = open_all(path, layout=layout)  # type: ignore[arg-type]
@@ -274,8 +320,8 @@ def _of_columns(found: Found, text: Text) -> Any:
     return of
 
 
-def _of_arrays(found: Found) -> Any:
-    """Return a function that returns an axis of the array of frames, or another array, as the page shows it."""
+def _of_arrays(found: Found, *, is_set: bool) -> Any:
+    """Return a function that returns an axis of the array of frames, another array, or a feature of a data set."""
     how = found.layout.data
     named = "" if how is None else how.axes or ""
     axes = named.split()
@@ -294,10 +340,11 @@ def _of_arrays(found: Found) -> Any:
         role = found.roles[k]
         menu: dict[str, Changes] = {_LEFT: {"time": None}, "time": {"time": role.name, "time_unit": None}}
         if role.axis:
-            menu = {word: {"axes": counting(k, word)} for word in _AXES}
-        elif role.certainty == OPEN:
+            menu = {word: {"axes": counting(k, word)} for word in AXES_OF_ARRAYS}
+        elif role.certainty == OPEN or (is_set and role.role != "time"):
             menu = {"frames": {"array": role.name}}
-        shown = "" if role.certainty == OPEN and not role.axis else role.role if role.role in menu else _LEFT
+        shown = "frames" if is_set and role.role == "taxel" else role.role if role.role in menu else _LEFT
+        shown = "" if role.certainty == OPEN and not role.axis else shown
         return asdict(role) | {"role": shown, "menu": menu, "units": {}, "curve": []}
 
     return of
@@ -306,6 +353,7 @@ def _of_arrays(found: Found) -> Any:
 def _fields(found: Found, kind: str, sheets: Sequence[str], path: Path) -> Iterator[dict[str, Any]]:
     """Yield what else can be said of a file: a choice of changes each, or a value of a key."""
     layout, table, data = found.layout, found.layout.table, found.layout.data
+    yield from (_choice(question.why, None, question.choices) for question in found.questions)
     is_timed = any(role.role == "time" and not role.axis for role in found.roles)
     if len(sheets) > 1 and table is not None:
         choices: dict[str, Changes] = {"all like the largest": {"sheet": None}, **{s: {"sheet": s} for s in sheets}}
@@ -321,8 +369,11 @@ def _fields(found: Found, kind: str, sheets: Sequence[str], path: Path) -> Itera
             yield _choice("Unit of the time", "" if "time_unit" in _keys_of(found.questions) else data.time_unit, units)
     if layout.axis is not None:
         yield _choice("Axes", layout.axis, {each: {"axis": each} for each in (*AXES, "shear", "all")})
-    yield {"label": "Taxels", "key": "rows", "value": layout.rows, "number": True}
-    yield {"label": "Columns", "key": "columns", "value": layout.columns, "number": True}
+    rows, columns, guess = layout.rows, layout.columns, ""
+    if layout.source is not None and rows is None and found.form is not None and found.form.lines:
+        (rows, columns), guess = array_of(found.form, None, None, "")[0].shape, " (a guess)"
+    yield {"label": f"Rows{guess}", "key": "rows", "value": rows, "number": True}
+    yield {"label": f"Columns{guess}", "key": "columns", "value": columns, "number": True}
     yield {"label": "Unit of the readings", "key": "unit", "value": layout.unit, "number": False}
     falls: dict[str, Changes] = {"rise": {"falls": None}, "fall": {"falls": True}}
     yield _choice("With pressure they", "fall" if layout.turned is not None else "rise", falls)

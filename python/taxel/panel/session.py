@@ -19,11 +19,9 @@ from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.device import ports
 from taxel.labels import Note
-from taxel.live.lines import preview
 from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
 from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
-from taxel.panel.look import picture
 from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
 from taxel.panel.shown_files import judged
@@ -273,7 +271,7 @@ class Session:
     @long_request
     async def look(
         self,
-        name: Annotated[str, line(110)],
+        name: Annotated[str, line(300)],
         text: Annotated[str, Meta(max_length=_MOST_LAYOUT)] | None = None,
         changes: dict[str, Any] | None = None,
     ) -> None:
@@ -285,7 +283,7 @@ class Session:
             message, whole = await in_thread(self._hub.folder.look, name, text, changes or {})
         await self.say(message)
         if whole is not None:
-            await self.say(await in_thread(picture, self._hub.folder.file(name), whole))
+            await self.say(await in_thread(self._hub.folder.seen, name, whole))
 
     @request
     async def lay(
@@ -391,21 +389,30 @@ class Session:
         await self.say({"type": "ports", "ports": listed})
 
     @long_request
-    async def guess(self, port: Annotated[str, line(255)], baud: Annotated[int, whole(*_core.BAUDS)]) -> None:
-        """Send `guess`: how the lines of a sensor on a serial port look, within two seconds.
+    async def guess(self, place: Annotated[str, line(255)], baud: Annotated[int, whole(*_core.BAUDS)]) -> None:
+        """Send `look` and `seen` of the first lines that arrive within two seconds; their name is the source.
 
-        `source` is what `connect` takes, with rows, columns and what else the lines show.
+        `place` is a serial port or server (HOST:PORT), a file of the folder, a pipe, or as ``lines+udp:HOST:PORT``.
         """
-        lines, about, source = await in_thread(preview, f"serial:{port},baud={baud}", _LOOK_S)
-        await self.say({"type": "guess", "lines": lines, "about": about, "source": source})
+        with at_field("place"):
+            source = await in_thread(self._hub.folder.hear, place, baud, _LOOK_S)
+        await self.look(source)
 
     @request
-    async def connect(self, source: Annotated[str, line(1024)]) -> None:
-        """Receive the lines of numbers of a sensor instead, for all clients; refused while recording."""
-        if not source.startswith("serial:"):
-            raise refused("source", ": must begin with serial:; taxel live --source takes the others")
+    async def connect(
+        self,
+        source: Annotated[str, line(1024)],
+        text: Annotated[str, Meta(max_length=_MOST_LAYOUT)] | None = None,
+    ) -> None:
+        """Receive the lines of numbers of a sensor instead, for all clients; refused while recording.
+
+        What of them is what says a layout as `text`, as `look` has it, if the source was looked at, or else `source`.
+        """
+        if text is None and not source.startswith("serial:"):
+            raise refused("source", ": must begin with serial:, or be one that was looked at")
         with at_field("source"):
-            await self._hub.read_source(source)
+            whole = source if text is None else await in_thread(self._hub.folder.looks.source, source, text)
+            await self._hub.read_source(whole)
 
     @request
     async def disconnect(self) -> None:

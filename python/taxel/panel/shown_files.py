@@ -26,7 +26,7 @@ from taxel.recording.analysis.quiet import ticks_by_unit
 from taxel.recording.analysis.rest import loaded_from, of_frames
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.kinds import FOREIGN, is_recording, layout_of
+from taxel.recording.kinds import is_recording, layout_of, takes_layout
 from taxel.recording.reading_options import layout_for
 from taxel.verdict import Verdict
 from taxel.wire import Registers
@@ -245,7 +245,7 @@ class ShownFiles:
         recording, names = self.opened(path, trial)
         are_events = not recording.is_several and recording.has_events
         viewed = _events(recording) if are_events else _frames(recording)
-        viewed.contents["has_roles"] = recording.kind in FOREIGN
+        viewed.contents["has_roles"] = takes_layout(recording.path)
         if not are_events:
             viewed.contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
         return viewed

@@ -20,12 +20,12 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import emed, event_camera, insoles, lerobot, neutouch, tekscan, xdf
+from taxel.formats import event_camera
 from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
 from taxel.formats.foreign import refuse_container
-from taxel.formats.layout import Layout, advice
+from taxel.formats.layout import Layout, Table, advice
 from taxel.formats.parts import parts_of
 from taxel.formats.ros import is_bag, read_ros
 from taxel.formats.table import ENDINGS as TABLES
@@ -70,7 +70,14 @@ class OpenOptions:
         """Selection of the events of a camera."""
         return Reduction(self.region, self.bin, self.count_ms, self.polarity)
 
-    def check(self, path: Path, kind: str) -> None:
+    def with_labels(self, path: Path, layout: Layout | None) -> Layout | None:
+        """Return what a layout says with the column of labels."""
+        if self.label_column is None:
+            return layout
+        full = layout or Layout(path)
+        return replace(full, table=replace(full.table or Table(), label_column=self.label_column))
+
+    def check(self, path: Path, kind: str, *, has_labels: bool) -> None:
         """Refuse what is only for files of another kind.
 
         Raises
@@ -80,7 +87,7 @@ class OpenOptions:
         flag("differences", self.differences)
         if kind != "ros" and not self.topic is self.field is self.ros is None:
             raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
-        if self.label_column is not None and kind not in ("table", "lerobot"):
+        if self.label_column is not None and not has_labels:
             raise refused("label_column", f" is {shown(self.label_column)}: is only for tables; {path} is none")
 
 
@@ -96,19 +103,13 @@ class Kind:
         Returns whether a file, or a folder, is of this kind.
     read : function of a path and its layout, or None
         Returns a reader of each source; readers of one name are the sources of one recording.
+    has_labels : bool, optional
+        Whether it has columns of labels, of which one is the label_column in the [table] of the layout.
     """
 
     knows: Callable[[Path], bool]
     read: Callable[[Path, Layout | None], Sequence[Reader]]
-
-
-_MODULES = {"emed": emed, "tekscan": tekscan, "xdf": xdf, "neutouch": neutouch, "lerobot": lerobot}
-#: Files of makers and of recorders.
-MAKERS = {
-    "moticon": Kind(insoles.is_moticon, insoles.read_moticon),
-    "pedar": Kind(insoles.is_pedar, insoles.read_pedar),
-    **{name: Kind(module.knows, module.read) for name, module in _MODULES.items()},
-}
+    has_labels: bool = False
 
 
 def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
@@ -124,7 +125,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
         return [_on_given(each, array) for each in read_array_file(path, layout or Layout(path))]
 
     def read_rows(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        readers = read_table(path, layout or Layout(path), array, how.label_column)
+        readers = read_table(path, layout or Layout(path), array)
         return [_on_given(each, array) for each in readers]
 
     def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
@@ -157,11 +158,9 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     }.items()
     yield from _from_elsewhere().items()
     yield from {
-        **MAKERS,
-        "lerobot": Kind(lerobot.knows, lambda path, layout: lerobot.read(path, layout, how.label_column)),
         "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
-        "table": Kind(_is_table, read_rows),
+        "table": Kind(_is_table, read_rows, has_labels=True),
         "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
     }.items()
 
@@ -238,6 +237,12 @@ def kind_of(path: Path) -> str | None:
     return next((name for name, kind in kinds() if kind.knows(path)), None)
 
 
+def takes_layout(path: Path) -> bool:
+    """Return whether a layout says what of a path is read: of a table, of arrays, of a data set that is a folder."""
+    kind = kind_of(path)
+    return kind in FOREIGN or (kind not in (None, "ros") and path.is_dir())
+
+
 def is_recording(path: Path, layout: GivenLayout = None) -> bool:
     """Return whether a path is a recording; what is damaged inside shows only when it is opened."""
     try:
@@ -279,8 +284,8 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder, and no ROS bag and no data set."""
-    return path.is_dir() and not is_bag(path) and not lerobot.knows(path)
+    """Return whether a path is a folder, and no recording by itself, as a ROS bag and a data set are."""
+    return path.is_dir() and not is_bag(path) and not any(kind.knows(path) for kind in _from_elsewhere().values())
 
 
 def layout_of(path: Path, layout: GivenLayout) -> Layout | None:

@@ -25,7 +25,6 @@ from taxel.reading import ENDINGS, InMemory, Reader
 from taxel.recording.beside import LABELS, labels_for
 from taxel.recording.kinds import (
     FOREIGN,
-    MAKERS,
     OpenOptions,
     are_spike_trains,
     check_recording,
@@ -75,7 +74,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         or "off" events, or "both".
     label_column : str or int, optional
         For a table: the column, by its name or number from 1, whose value becomes a label where it changes; it is no
-        taxel. For a LeRobot data set: a feature, or "task".
+        taxel. For a data set of robots: a feature, or "task".
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
@@ -133,7 +132,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     Parameters
     ----------
     path : path
-        A folder of recordings of taxel, of ROS bags, or of files of another format; a LeRobot data set; or a file, as
+        A folder of recordings of taxel, of ROS bags, or of files of another format; a data set; or a file, as
         for `taxel.open`.
     array, layout, topic, field, ros
         As in `taxel.open`.
@@ -195,10 +194,11 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     if kind is None:
         raise unknown(path)
     refuse_empty(path, kind)
-    options.check(path, kind)
+    found = next(each for name, each in kinds(options) if name == kind)
+    options.check(path, kind, has_labels=getattr(found, "has_labels", False))
     before = path.stat()
     try:
-        readers = next(each for name, each in kinds(options) if name == kind).read(path, layout)
+        readers = found.read(path, options.with_labels(path, layout))
     except MemoryError:
         raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
     after = path.stat()
@@ -294,7 +294,7 @@ def _refuse_folder(folder: Path) -> None:
     ]
     hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} contain recordings: name these folders"
     known = (
-        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(MAKERS)}, event cameras, and "
+        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), event cameras, and "
         "arrays and tables of other programs, for example .npy and .txt (docs/files.md)"
     )
     raise FormatError(f"{folder}: contains no recording; {hint if deeper else known}")

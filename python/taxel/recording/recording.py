@@ -300,6 +300,11 @@ class Recording:
         return self._main.facts.heel
 
     @property
+    def episode(self) -> int | None:
+        """The number of the trial in a data set whose tables have one; else None."""
+        return self._main.facts.episode
+
+    @property
     def is_slice(self) -> bool:
         """Whether this is a slice of the file, made by `between`."""
         return self._main.view.is_slice

@@ -26,7 +26,6 @@ from taxel.detect.readout import rest_for, run
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
-from taxel.formats.lerobot import episode_of
 from taxel.options import DetectOptions
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
@@ -126,12 +125,12 @@ class Detecting:
         return [detected.outcome for detected in self.each]
 
     def by_frame(self) -> Any:
-        """Return a DataFrame of the detections in a data set of LeRobot, which joins with its tables; None in others.
+        """Return a DataFrame of the detections in a data set, which joins with its tables; None in others.
 
         Its columns are ``episode_index``, ``frame_index`` (of the last frame not after ``known_s``), ``label``, ``t_s``
         and ``known_s``, and ``source`` where an episode has several.
         """
-        if not all(each.recording.kind == "lerobot" for each in self.each):
+        if any(each.recording.episode is None for each in self.each):
             return None
         import pandas as pd  # noqa: PLC0415  takes long
 
@@ -139,7 +138,7 @@ class Detecting:
         for each in self.each:
             recording, found = each.recording, each.outcome.found
             last = np.searchsorted(recording.frames().t, found.known, side="right") - 1
-            of = {"episode_index": episode_of(recording.name), "source": recording.label, "frame_index": last}
+            of = {"episode_index": recording.episode, "source": recording.label, "frame_index": last}
             tables.append(
                 pd.DataFrame({**of, "label": found.label, "t_s": found.t / 1e6, "known_s": found.known / 1e6})
             )

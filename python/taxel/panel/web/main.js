@@ -257,8 +257,6 @@ function receive(message) {
       return lanes.write(timeline);
     case "ports":
       return sensor.offer(message);
-    case "guess":
-      return sensor.take(message);
     case "look":
       return roles.take(message);
     case "seen":

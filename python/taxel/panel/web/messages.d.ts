@@ -420,7 +420,7 @@ export type ShownField =
   | { label: string; value: string | null; choices: Record<string, Changes> }
   | { label: string; key: string; value: unknown; number: boolean };
 
-/** What a file of another program holds by a layout, `text`; `seen` follows where it can be read. */
+/** What a file of another program, or a live source, holds by a layout, `text`; `seen` follows where it can be read. */
 export interface Look {
   type: "look";
   name: string;
@@ -432,8 +432,8 @@ export interface Look {
   questions: { why: string; choices: Record<string, Changes> }[];
   fields: ShownField[];
   said: string[];
-  /** The layout file of this recording, and that of its folder. */
-  files: [string, string];
+  /** The layout file of this recording, and that of its folder; none of the first lines of a live source, which `guess` asks for. */
+  files: [string, string] | [];
 }
 
 /** The sensors of a file as a layout reads it, open questions answered by their first choices. */
@@ -699,16 +699,6 @@ export interface Ports {
   ports: { place: string, about: string }[];
 }
 
-/** When asked: how the lines of a sensor on a serial port look. */
-export interface Guess {
-  type: "guess";
-  lines: string[];
-  /** What they seem to be, in words. */
-  about: string;
-  /** What `connect` takes. */
-  source: string;
-}
-
 /** When asked: what the curves are at a time, of all taxels and then of each of several sources; null where none has a value. */
 export interface Values {
   type: "values";
@@ -739,7 +729,7 @@ export interface PortsRequest {
 export interface GuessRequest {
   type: "guess";
   id?: number;
-  port: string;
+  place: string;
   baud: number;
 }
 
@@ -747,6 +737,7 @@ export interface ConnectRequest {
   type: "connect";
   id?: number;
   source: string;
+  text?: string | null;
 }
 
 export interface DisconnectRequest {
@@ -778,8 +769,7 @@ export type Message =
   | Refused
   | Warning
   | Values
-  | Ports
-  | Guess;
+  | Ports;
 
 export type Request =
   | CreditRequest

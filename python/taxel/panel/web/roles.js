@@ -1,4 +1,5 @@
-// The dialog that shows what the columns or axes of a file of another program are, changes it, and writes it as a layout file.
+// The dialog that shows what the columns or axes of a file of another program are, or those of the lines of a sensor, changes
+// it, and writes it as a layout file, or connects the sensor.
 
 import { ground, fitted, make, part, themed, write } from "./dom.js";
 import { counted } from "./words.js";
@@ -79,13 +80,20 @@ export class Roles {
 
   /** Opens the dialog of a file. @param {string} name */
   open(name) {
+    this.begin(name, false);
+    this.ask({});
+  }
+
+  /** @param {string} name of a file, or of a live source @param {boolean} isLive */
+  begin(name, isLive) {
     this.name = name;
     this.look = null;
-    write(part("roles-title", HTMLElement), `What ${name} holds`);
+    write(part("roles-title", HTMLElement), `What ${name} ${isLive ? "prints" : "holds"}`);
+    write(part("roles-open", HTMLElement), isLive ? "Connect" : "Open");
+    part("roles-place", HTMLElement).hidden = isLive;
     for (const id of ["roles-rows", "roles-fields", "roles-seen"]) part(id, HTMLElement).replaceChildren();
     this.settle();
     if (!this.dialog.open) this.dialog.showModal();
-    this.ask({});
   }
 
   /** @param {Changes} changes */
@@ -109,13 +117,15 @@ export class Roles {
   settle() {
     this.replace.hidden = true;
     part("roles-text", HTMLElement).hidden = true;
-    const [own, folder] = this.look?.files ?? ["", ""];
+    const [own = "", folder = ""] = this.look?.files ?? [];
     write(part("roles-file", HTMLElement), `Writes ${this.folder.checked ? folder : own}`);
     part("roles-open", HTMLButtonElement).disabled = !this.look || this.look.questions.length > 0;
   }
 
   /** @param {Look} look @param {boolean} [isNew] */
   take(look, isNew = true) {
+    // The lines of a sensor come as they were asked for in another dialog.
+    if (!look.files.length && !this.dialog.open) this.begin(look.name, true);
     if (look.name !== this.name) return;
     this.look = look;
     const change = (/** @type {Changes} */ changes) => this.ask(changes);
@@ -142,7 +152,7 @@ export class Roles {
     if (!isNew) return this.settle();
     const more = look.more ? [`${counted(look.more, "column")} more, taxels like these`] : [];
     const asks = look.questions.map(({ why, choices }) => `Open: ${why} (${Object.keys(choices).join(", ")})`);
-    this.say([...asks, ...look.said, ...more].join("\n") || "All is known. Open writes it down and shows the recording.");
+    this.say([...asks, ...look.said, ...more].join("\n") || "All is known.");
     if (look.questions.length) part("roles-seen", HTMLElement).replaceChildren();
     this.settle();
   }
@@ -177,23 +187,25 @@ export class Roles {
     if (refused) part("roles-open", HTMLButtonElement).disabled = true;
   }
 
-  /** Writes the layout file, and shows the recording. @param {boolean} replace over one that is there */
+  /** Writes the layout file, and shows the recording; or connects the sensor. @param {boolean} replace over one that is there */
   async write(replace) {
     if (!this.look) return;
-    const { text, name } = this.look;
+    const { text, name, files } = this.look;
     try {
-      await this.server.request({ type: "lay", name, text, folder: this.folder.checked, replace });
+      const lay = { type: /** @type {const} */ ("lay"), name, text, folder: this.folder.checked, replace };
+      await this.server.request(files.length ? lay : { type: "connect", source: name, text });
     } catch (error) {
       const [reason, field] = error instanceof Error ? [error.message, /** @type {{ field?: string | null }} */ (error).field] : [String(error), null];
       this.say(reason);
       this.settle();
       this.replace.hidden = field !== "replace";
+      if (!files.length) return;
       // Where it cannot be written it can be copied.
       part("roles-text", HTMLElement).hidden = field === "replace";
       write(part("roles-text", HTMLElement), ...text.split("\n"));
       return;
     }
     this.dialog.close();
-    this.show(name);
+    if (files.length) this.show(name);
   }
 }

@@ -11,6 +11,7 @@ from taxel.clock import doubt
 from taxel.events import Events
 from taxel.formats.layout import layout_name
 from taxel.frames import Frames
+from taxel.reading import ENDINGS
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series
 from taxel.recording.frames import value_us
@@ -22,8 +23,8 @@ _PEAK_US = 10_000
 _PLACES = 100
 #: Kinds of files that do not state the sensor of their events.
 _WITHOUT_SIZE = ("csv", "lsa", "records", "table")
-#: Kinds of files whose times may be those at which a host asked.
-_OF_HOSTS = ("records", "table", "neutouch")
+#: Kinds of files whose times are those of a board or of a camera; those of others may be when a host asked.
+_OF_BOARDS = (*ENDINGS.values(), "events", "merged", "event_camera")
 
 
 def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
@@ -56,7 +57,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         events = table
         facts["events"] = len(events)
         facts["intensities"] = 0 if events.present is None else int(events.present.sum())
-        facts["bursts_us"] = _bursts_us(events.t) if recording.kind in _OF_HOSTS else None
+        facts["bursts_us"] = _bursts_us(events.t) if recording.kind not in _OF_BOARDS else None
         facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
         if events.intensity is None and _may_be_of_camera(recording):

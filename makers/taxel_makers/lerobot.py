@@ -16,19 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.errors import damaged, refused, unreadable
-from taxel._base.messages import first_line, warn
-from taxel._base.table_text import read_parquet, values_in
-from taxel._core import ProblemError
+from taxel import Frames
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.layout import Data, Layout
 from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
 from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role
 from taxel.formats.times import in_order
-from taxel.frames import Frames
 from taxel.labels import Note, source_of
-from taxel.reading import InMemory
+from taxel.reading import InMemory, damaged, read_parquet, refused, unreadable, values_in, warn
+from taxel.recording.kinds import Kind
 
 _TOUCH = re.compile(r"tactile|touch|taxel|pressure|force", re.IGNORECASE)
 #: Columns of every data set that are no features of a robot, and kinds of features that hold no numbers.
@@ -43,37 +40,11 @@ def knows(path: Path) -> bool:
     return (path / "meta" / "info.json").is_file()
 
 
-def episode_of(name: str) -> int:
-    """Return the number of the episode that a recording is.
-
-    Examples
-    --------
-    >>> episode_of("episode_000012")
-    12
-    """
-    return int(name.rpartition("_")[2])
-
-
-def check_target(file: Path | None, recordings: Sequence[Path]) -> None:
-    """Refuse to write a table of detections among those of a data set, or as Parquet if it is of anything else.
-
-    Raises
-    ------
-    ProblemError : it is so
-    """
-    if file is None:
-        return
-    if file.suffix.lower() == ".parquet" and not all(map(knows, recordings)):
-        raise ProblemError(f"{file}: is only for detections in a data set of LeRobot; write a .csv")
-    if any(folder.name in ("data", "meta", "videos") and knows(folder.parent) for folder in file.absolute().parents):
-        raise ProblemError(f"{file}: is among the tables of a data set; write it elsewhere")
-
-
-def read(path: Path, layout: Layout | None = None, label_column: str | int | None = None) -> list[InMemory]:
+def read(path: Path, layout: Layout | None = None) -> list[InMemory]:
     """Return a reader of each touch feature of each episode, or of the feature that `[data] array` of a layout names.
 
-    Where `label_column` is a feature, such as ``next.success``, its changes are labels, of a feature of true and false
-    those to true; where it is "task", the task is one, at the first frame.
+    Where the label_column of the layout is a feature, such as ``next.success``, its changes are labels, of a feature of
+    true and false those to true; where it is "task", the task is one, at the first frame.
 
     Raises
     ------
@@ -87,7 +58,7 @@ def read(path: Path, layout: Layout | None = None, label_column: str | int | Non
     full = layout or Layout(path)
     full = replace(full, data=replace(full.data or Data(), time="timestamp"))
     assert full.data is not None  # it was replaced
-    label = label_column or (full.table.label_column if full.table is not None else None)
+    label = None if full.table is None else full.table.label_column
     if label is not None and label not in (*features, TASK):
         raise refused("label_column", f" is {label!r}: must be {TASK}, or a feature: {', '.join(features)}")
     touch = [name for name in numbers if _TOUCH.search(name) and name != label]
@@ -111,7 +82,7 @@ def read(path: Path, layout: Layout | None = None, label_column: str | int | Non
                 sensors, names = _values(rows[feature], numbers[feature])
             except (ValueError, TypeError) as error:
                 stated = f"shape {numbers[feature]['shape']} in meta/info.json"
-                raise unreadable(f"{feature} of {name} is not of {stated}: {first_line(error)}", path) from None
+                raise unreadable(f"{feature} of {name} is not of {stated}: {error}", path) from None
             called = source_of(feature.removeprefix("observation."))
             for k, values in enumerate(sensors):
                 sources.update(
@@ -119,7 +90,7 @@ def read(path: Path, layout: Layout | None = None, label_column: str | int | Non
                 )
         notes = dict.fromkeys(sources, _notes(str(label), list(cells), t))
         for each in readers_of(path, "lerobot", sources, full, (), timed=True, lost=lost, notes=notes, roles=roles):
-            readers.append(replace(each, facts=replace(each.facts, name=name)))
+            readers.append(replace(each, facts=replace(each.facts, name=name, episode=int(number))))
     for text in dict.fromkeys(said):
         warn(f"{path.name}: {text}", stacklevel=6)
     return readers
@@ -133,7 +104,7 @@ def _info(path: Path) -> dict[str, Any]:
         place = Path(info["data_path"])
         sound = all({"dtype", "shape"} <= each.keys() for each in info["features"].values())
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise damaged(file, "description of a data set", f"it lacks {first_line(error)}") from None
+        raise damaged(file, "description of a data set", f"it lacks {error}") from None
     if not sound or place.is_absolute() or ".." in place.parts:
         raise unreadable("must state data_path within the folder, and dtype and shape of each feature", file)
     return info
@@ -249,3 +220,6 @@ def _notes(name: str, cells: Sequence[Any], t: NDArray[np.int64]) -> list[Note]:
         if isinstance(cell, str) or (k and (cell or not is_flag)):
             notes.append(Note(cell if isinstance(cell, str) else name if is_flag else f"{name} {cell:g}", int(t[k])))
     return notes
+
+
+LEROBOT = Kind(knows, read, has_labels=True)

@@ -12,14 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel._base.errors import unreadable
-from taxel._base.messages import first_line
-from taxel._base.table_text import Text, beginning
-from taxel._core import ProblemError
-from taxel.array import Array
+from taxel import Array, Frames, ProblemError
 from taxel.formats.layout import Layout
-from taxel.frames import Frames
-from taxel.reading import Facts, InMemory
+from taxel.reading import Facts, InMemory, Text, beginning, unreadable
 
 _LENGTHS_MM = {"mm": 1.0, "millimeters": 1.0, "cm": 10.0, "centimeters": 10.0, "in": 25.4, "inches": 25.4}
 #: Tekscan's names of units, and ours; any other name is not changed.
@@ -74,7 +69,8 @@ def read(path: Path, _layout: Layout | None = None) -> list[InMemory]:
             skip_blank_lines=False,
         )
     except ValueError as error:  # of pandas' parser too
-        raise unreadable(f"a frame has a cell that is no number, or too few: {first_line(error)}", path) from None
+        why = str(error).splitlines()[0]
+        raise unreadable(f"a frame has a cell that is no number, or too few: {why}", path) from None
     values = table.to_numpy().reshape(-1, rows, columns)
     is_missing = np.isnan(values)
     differs = np.flatnonzero((is_missing != is_missing[0]).any(axis=(1, 2)))
@@ -90,6 +86,6 @@ def read(path: Path, _layout: Layout | None = None) -> list[InMemory]:
     try:
         frames = Frames(np.nan_to_num(values), t, unit=_UNITS.get(stated.lower(), stated), array=array)
     except ProblemError as error:
-        raise unreadable(first_line(error), path) from None
+        raise unreadable(str(error), path) from None
     torn = len(begins) - len(whole)
     return [InMemory(Facts(path=path, array=array, kind="tekscan", lost=("a frame that is cut off",) * torn), frames)]

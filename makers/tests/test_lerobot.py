@@ -1,6 +1,6 @@
 """Data sets of LeRobot: episodes are trials, touch features are sources, and detections join with the tables.
 
-``tests/data/lerobot`` was written by lerobot-dataset 0.4.4 (version 3.0; without its statistics, and with a
+``data`` was written by lerobot-dataset 0.4.4 (version 3.0; without its statistics, and with a
 stand-in for torch, which its writer imports alone). That of version 2.1 is written here by its documented form.
 """
 
@@ -16,12 +16,14 @@ import pandas as pd
 import pytest
 from refusal import refused
 from shell import call
+from tests.panel.protocol import Client
 
 import taxel
 from taxel import FormatError, ProblemError
 from taxel._base.errors import Place
+from taxel.panel import Panel
 
-WRITTEN = Path(__file__).parents[1] / "data" / "lerobot"
+WRITTEN = Path(__file__).parent / "data"
 DATA = pd.read_parquet(WRITTEN / "data" / "chunk-000" / "file-000.parquet")
 
 
@@ -134,3 +136,24 @@ def test_a_data_set_that_is_none_is_refused(tmp_path: Path) -> None:
         file.write_text(json.dumps(each))
         with refused(FormatError, place=Place("info.json")):
             taxel.open_all(path)
+
+
+def test_a_data_set_is_shown_by_the_page_and_its_features_are_chosen(tmp_path: Path) -> None:
+    values = [np.array([k, 0, 2 * k], np.float32) for k in range(200)]
+    path = of_version_2(tmp_path / "a", {"finger.force": three()}, **{"finger.force": values})
+    with Panel(tmp_path) as panel, Client(panel) as page:
+        assert page.ask("open", name="a")["field"] == "roles"
+        page.ask("look", name="a")
+        said = page.since_asked("look", name="a")
+        [question] = said["questions"]
+        assert {"label": question["why"], "value": None, "choices": question["choices"]} in said["fields"]
+        page.ask("look", name="a", text=said["text"], changes=question["choices"]['axis = "z"'])
+        of_z = page.since_asked("look", name="a")
+        assert {role["name"]: role["role"] for role in of_z["roles"]}["finger.force"] == "frames"
+        frames = next(role["menu"] for role in of_z["roles"] if role["name"] == "observation.state")["frames"]
+        page.ask("look", name="a", text=of_z["text"], changes=frames)
+        assert page.ask("lay", name="a", text=page.since_asked("look", name="a")["text"])["type"] == "done"
+        assert page.ask("open", name="a")["type"] == "done"
+        opened = page.since_asked("opened")
+        assert (opened["frames"]["trials"][:2], opened["array"]["columns"]) == (["episode_000000", "episode_000001"], 2)
+    assert [each.array.names for each in taxel.open_all(path)] == 6 * [("a", "b")]

@@ -13,13 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel._base.errors import unreadable
-from taxel._base.table_text import Text, beginning
-from taxel._core import ProblemError
-from taxel.array import Array
+from taxel import Array, Frames, ProblemError
 from taxel.formats.layout import Layout
-from taxel.frames import Frames
-from taxel.reading import Facts, InMemory
+from taxel.reading import Facts, InMemory, Text, beginning, unreadable
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _HEAD = re.compile(

@@ -16,21 +16,19 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel._base.errors import unreadable
-from taxel._base.table_text import Text, beginning
-from taxel.array import Array
+from taxel import Array, Frames
 from taxel.formats.column_names import time_unit
 from taxel.formats.layout import Layout, Table
 from taxel.formats.table import read_table
-from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.reading import Facts, InMemory, Marks
+from taxel.reading import Facts, InMemory, Marks, Text, beginning, unreadable
+from taxel.recording.kinds import Kind
 
 #: Moticon's markers in the columns of steps, by the foot.
 _MARKERS = {"left": {"11": "contact", "15": "foot_off"}, "right": {"21": "contact", "25": "foot_off"}}
 
 
-def is_pedar(path: Path) -> bool:
+def knows_pedar(path: Path) -> bool:
     """Return whether a file is of pedar: an ``.asc`` whose head names pressures."""
     return path.suffix.lower() == ".asc" and b"pressure values" in beginning(path)
 
@@ -54,7 +52,7 @@ def read_pedar(path: Path, _layout: Layout | None = None) -> list[InMemory]:
     return _feet(path, "pedar", Layout(path, unit=unit[1] if unit else "kPa", table=how), how)
 
 
-def is_moticon(path: Path) -> bool:
+def knows_moticon(path: Path) -> bool:
     """Return whether a file is of Moticon: a ``.txt`` with a comment that names the sensor insoles."""
     head = beginning(path, 4096).removeprefix(b"\xef\xbb\xbf") if path.suffix.lower() == ".txt" else b""
     return head.startswith(b"#") and b"Sensor insoles" in head
@@ -107,3 +105,6 @@ def _feet(path: Path, maker: str, layout: Layout, how: Table) -> list[InMemory]:
         )
         readers.append(InMemory(facts, frames, Marks(notes=notes)))
     return readers
+
+
+PEDAR, MOTICON = Kind(knows_pedar, read_pedar), Kind(knows_moticon, read_moticon)

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from formats.making import shared, write_emed, write_moticon, write_pedar, write_tekscan
 
 import taxel
 from taxel import FormatError, Frames, Recording
 from taxel.recording.kinds import kind_of
 
-from .making import shared, write_emed, write_moticon, write_pedar, write_tekscan
-
-EXCERPTS = Path(__file__).parents[1] / "data" / "formats"
+EXCERPTS = Path(__file__).parents[2] / "tests" / "data" / "formats"
 WRITERS = {"pedar": write_pedar, "moticon": write_moticon, "tekscan": write_tekscan, "emed": write_emed}
 
 

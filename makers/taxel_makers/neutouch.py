@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from taxel._base.table_text import Text
-from taxel.array import Array
+from taxel import Array
 from taxel.formats.layout import Layout, Table
 from taxel.formats.table import read_table
-from taxel.reading import InMemory
+from taxel.reading import InMemory, Text
 
 
 def knows(path: Path) -> bool:

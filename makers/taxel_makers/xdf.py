@@ -8,16 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.columns import frozen_whole
-from taxel._base.errors import damaged, unreadable
-from taxel._base.messages import counted, first_line, installing
-from taxel.array import Array
+from taxel import Array, Frames
 from taxel.formats.layout import Layout
 from taxel.formats.roles import FIRST, Role
 from taxel.formats.times import repaired
-from taxel.frames import Frames
 from taxel.labels import Note, source_of
-from taxel.reading import Facts, InMemory, Marks
+from taxel.reading import Facts, InMemory, Marks, unreadable
 
 
 def knows(path: Path) -> bool:
@@ -41,12 +37,13 @@ def read(path: Path, layout: Layout | None = None) -> list[InMemory]:
     try:
         import pyxdf  # noqa: PLC0415  an extra
     except ImportError:
-        text = f"to read a .xdf, taxel needs pyxdf, which is not installed: {installing('lsl')}"
+        text = "to read a .xdf, taxel needs pyxdf, which is not installed: pip install 'taxel[lsl]'"
         raise ImportError(f"{path}: {text}") from None
     try:
         streams, _ = pyxdf.load_xdf(path, verbose=False)
     except Exception as error:  # of pyxdf's parts: of struct, of XML
-        raise damaged(path, ".xdf", first_line(error)) from None
+        why = str(error).partition("\n")[0] or type(error).__name__
+        raise unreadable(f"the .xdf is damaged or not complete ({why}); copy or write it again", path) from None
     of_numbers = {_name(each): each for each in streams if isinstance(each["time_series"], np.ndarray)}
     of_numbers = {name: each for name, each in of_numbers.items() if len(each["time_stamps"])}
     texts = [each for each in streams if not isinstance(each["time_series"], np.ndarray)]
@@ -80,8 +77,8 @@ def _reader(path: Path, name: str, stream: dict[str, Any], notes: tuple[Note, ..
     is_named = len(names) == values.shape[1] and any(names)
     array = Array(1, values.shape[1], name=name, names=names if is_named else None)
     unit = units.pop() if len(units) == 1 else ""
-    frames = Frames(frozen_whole(values[:, None]), frozen_whole(found.t), unit=unit or "as sent", array=array)
-    remarks = tuple(f"{counted(len(t), 'time')}: {said}" for said in found.said)
+    frames = Frames(values[:, None], found.t, unit=unit or "as sent", array=array)
+    remarks = tuple(f"{len(t)} times: {said}" for said in found.said)
     facts = Facts(path=path, array=array, kind="xdf", label=source_of(name), source=name, remarks=remarks)
     first = [[f"{value:g}" for value in column] for column in values[:FIRST].T.tolist()]
     own = names if is_named else [f"channel {k + 1}" for k in range(len(first))]
