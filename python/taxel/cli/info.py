@@ -23,9 +23,9 @@ from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._say import say
-from taxel.cli._task import Output, progress, say_failures, say_warnings
 from taxel.cli._topics import list_topics
 from taxel.cli.app import OUTSIDE, App, Flat
+from taxel.cli.task import Output, progress, say_failures, say_warnings
 from taxel.clock import doubt
 from taxel.options import FullReading
 
