@@ -19,6 +19,8 @@ from taxel.recording.kinds import is_folder, natural_order, recordings_in
 __all__ = ["PEOPLE", "RECORDINGS", "Cohort", "Entry"]
 
 PEOPLE, RECORDINGS = "people.csv", "recordings.csv"
+#: What every table of results begins with.
+RESULT = b"# taxel "
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,15 @@ def _files(folder: Path, layout: Path | None) -> list[Path]:
     """Return the recordings in a folder, and in its folders."""
     deeper = [one for one in sorted(folder.iterdir(), key=natural_order) if is_folder(one)]
     found = [file for place in (folder, *deeper) for file in recordings_in(place, layout)]
-    return [file for file in found if file.name not in (PEOPLE, RECORDINGS)]
+    return [file for file in found if file.name not in (PEOPLE, RECORDINGS) and not _is_result(file)]
+
+
+def _is_result(file: Path) -> bool:
+    """Return whether a file is a table that an earlier run wrote."""
+    if file.suffix != ".csv" or not file.is_file():
+        return False
+    with file.open("rb") as opened:
+        return opened.read(len(RESULT)) == RESULT
 
 
 def _name(folder: Path, file: Path) -> str:
