@@ -91,10 +91,11 @@ def steps(
         running.clear(folder)
         say(f"taxel: {cohort.place}: no step was found, so no table is written", err=True)
         return WRONG_INPUT
-    about = _about(list(measured.values()), rows, left_out)
+    definitions = list(dict.fromkeys(words for one in measured.values() for words in one.definitions))
+    about = _about(list(measured.values()), definitions, rows, left_out)
     over_stance = [curve for one in measured.values() for curve in one.curves]
     written = _write(folder, about, rows, over_stance, decimal_comma=decimal_comma, overwrite=output.overwrite)
-    write_report(folder / _PAGE, about, rows, over_stance, overwrite=output.overwrite)
+    write_report(folder / _PAGE, about, definitions, rows, over_stance, overwrite=output.overwrite)
     running.clear(folder)
     used = Counter(row["used"] for row in rows)
     people = len({(row["person"], row["condition"]) for row in rows})
@@ -129,11 +130,15 @@ def _measure(tables: dict[Entry, list[Path]], options: StepOptions, reading: Rea
     return measure(entry, options, reading, tables[entry]).to_dict()
 
 
-def _about(measured: Sequence[Measured], rows: Sequence[dict[str, Any]], left_out: dict[str, str]) -> list[str]:
+def _about(
+    measured: Sequence[Measured],
+    definitions: Sequence[str],
+    rows: Sequence[dict[str, Any]],
+    left_out: dict[str, str],
+) -> list[str]:
     """Return what stands above the names of each table."""
     used = Counter(row["used"] for row in rows)
     reasons = {name: why for one in measured for name, why in one.reasons.items()}
-    definitions = dict.fromkeys(words for one in measured for words in one.definitions)
     return [
         f"taxel {taxel.__version__}, taxel steps",
         *definitions,

@@ -31,6 +31,7 @@ _SHOWN = (
 def write_report(
     path: Path,
     about: Sequence[str],
+    definitions: Sequence[str],
     rows: Sequence[Mapping[str, Any]],
     over_stance: Sequence[Sequence[float] | None],
     *,
@@ -43,6 +44,8 @@ def write_report(
     path : Path
     about : sequence of str
         What the tables have above their names: thresholds, definitions, what was left out.
+    definitions : sequence of str
+        How contact and lift are defined, for the captions.
     rows, over_stance
         Those of the steps, and their curves.
     overwrite : bool
@@ -54,6 +57,7 @@ def write_report(
         "report.html.j2",
         package="taxel_gait",
         about=about,
+        definitions=definitions,
         sheets=[
             _sheet(" ".join(filter(None, key)), [rows[k] for k in own], [over_stance[k] for k in own])
             for key, own in sheets.items()
