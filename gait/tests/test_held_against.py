@@ -1,6 +1,7 @@
 """The rule against contacts and foot-offs of published recordings, as ``python -m taxel_gait.against`` prints it."""
 
 import pytest
+from walking import published
 
 from taxel_gait.against import EVENTS, Tally, found_by, labelled_in
 from taxel_gait.stances import DEFINITIONS
@@ -16,7 +17,7 @@ GOALS = {
 
 
 @pytest.mark.parametrize(("name", "definition", "event"), GOALS)
-def test_the_rule_finds_what_others_found(published, name, definition, event):
+def test_the_rule_finds_what_others_found(name, definition, event):
     feet = list(labelled_in(published(name)))
     tally = Tally.summed(Tally.of(found_by(one, DEFINITIONS[definition])[event], one, event) for one in feet)
     found = len(tally.errors_ms)

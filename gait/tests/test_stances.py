@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from walking import RAMP, STANCE, TOP_N, contacts, load
+from walking import RAMP, STANCE, TOP_N, contacts, load, published
 
 import taxel
 from taxel import ProblemError
@@ -114,7 +114,7 @@ def test_what_is_no_definition_is_refused(text):
         Definition.of(text)
 
 
-def test_f_scan_rises_where_its_readme_says(published):
+def test_f_scan_rises_where_its_readme_says():
     foot = Foot.of(taxel.open(published("insole_fscan") / "walk_01L.asf"), "left")
     found = find_stances(foot.t, foot.force, Definition("percent", 5, 5))
     # Rises above 50 N at these frames; a stance that begins the recording has no contact.
@@ -122,7 +122,7 @@ def test_f_scan_rises_where_its_readme_says(published):
     assert foot.force.max() == pytest.approx(924, abs=1)
 
 
-def test_pedar_contacts_are_near_those_of_its_readme(published):
+def test_pedar_contacts_are_near_those_of_its_readme():
     recording = taxel.open(published("pressure_formats") / "pedar_example.asc")
     rows = {
         "left": [343, 477, 603, 734, 859, 988, 1119, 1249, 1389],

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from walking import RAMP, STANCE, STEP, STRIDE, contacts, two_feet
+from walking import RAMP, STANCE, STEP, STRIDE, contacts, load, trapezium, two_feet
 
 import taxel
 from taxel_gait import DEFINITIONS, Foot, find_stances, steps_of
@@ -100,8 +100,6 @@ def test_a_single_unusual_stride_is_not_called_a_turn():
 
 
 def test_standing_ends_a_bout():
-    from walking import load, trapezium
-
     t = np.arange(4000) / 100
     # Both feet stay on the ground for 3 s from 10.5 s.
     left = load(t, [*contacts(0.5, 10), *contacts(15.0, 20)]) + trapezium(t, 10.5, 14.0)

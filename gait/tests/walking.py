@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 #: Stride and stance of each foot, s; the right foot is half a stride later, so double support is 0.1 s, twice.
 STRIDE, STANCE, STEP = 1.0, 0.6, 0.5
 TOP_N = 800.0
 #: A load rises and falls in this time, s.
 RAMP = 0.05
+
+SHARED = Path(os.environ.get("TAXEL_DATA", Path(__file__).parents[3] / "shared" / "data"))
+
+
+def published(name):
+    """Return the folder of a published data set; a test is skipped where it is not there."""
+    if not (SHARED / name).is_dir():
+        pytest.skip(f"no {name} in {SHARED}: set TAXEL_DATA")
+    return SHARED / name
 
 
 def trapezium(t, contact, lift, top=TOP_N):
