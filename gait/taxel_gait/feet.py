@@ -14,8 +14,6 @@ from taxel.recording.opening import sensors
 __all__ = ["SIDES", "Foot", "feet_of"]
 
 SIDES = ("left", "right")
-#: The force of a taxel in N, by the unit of its value and its area in mm2.
-_NEWTON = {"kPa": 1e-3, "N/cm2": 1e-2}
 #: Times above this, us, count from 1970.
 _SINCE_1970_US = 1_000_000_000_000_000
 
@@ -72,11 +70,8 @@ class Foot:
 
 def load_of(frames: Frames) -> tuple[NDArray[np.float64], str]:
     """Return the load of each frame, and its unit: N where it is known, else that of the values that are added up."""
-    areas = frames.array.area_mm2
-    if areas is None or frames.unit not in _NEWTON:
-        return frames.total(), frames.unit
-    weights = (areas * _NEWTON[frames.unit]).ravel()
-    return frames.values.reshape(len(frames), -1) @ weights, "N"
+    force = frames.force()
+    return (frames.total(), frames.unit) if force is None else (force, "N")
 
 
 def feet_of(recordings: Sequence[Recording], side: str = "", *, same_clock: bool = False) -> list[Foot]:

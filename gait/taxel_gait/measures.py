@@ -126,11 +126,10 @@ def loading_rate(t: NDArray[np.float64], force: NDArray[np.float64]) -> float:
 def _path(foot: Foot, step: Step) -> Mapping[str, float]:
     """Return the length and the mean speed of the path of the centre of pressure."""
     stance = slice(step.first, step.end)
-    force = foot.force[stance]
-    counts = force > CENTRE * force.max()
-    unit = foot.frames.array.centre_unit
-    centre, t = foot.frames[stance].centre()[counts], foot.t[stance][counts]
-    if len(t) < 2 or not np.isfinite(centre).all():
+    path, unit = foot.frames[stance].centre_path(CENTRE), foot.frames.array.centre_unit
+    counts = ~np.isnan(path[:, 0])
+    centre, t = path[counts], foot.t[stance][counts]
+    if len(t) < 2:
         return {}
     length = float(np.hypot(*np.diff(centre, axis=0).T).sum())
     return {f"cop_length_{unit}": length, f"cop_speed_{unit}_per_s": length / float(t[-1] - t[0])}
