@@ -29,7 +29,7 @@ prerequisites:
 
 # What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
 # Of the distributions of their own in this repository, that is what they need beside taxel. `rules` has a compiled part.
-BESIDE := studies benchmarks viewers bridge makers
+BESIDE := studies benchmarks viewers bridge makers gait
 PROJECTS := pyproject.toml $(BESIDE:%=%/pyproject.toml) rules/pyproject.toml
 wanted = $(BIN)/python -c 'import sys, tomllib; projects = [tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()]; extras = {"beside": [x for p in projects[1:] for x in p["dependencies"]]} | {k: v for p in projects for k, v in p.get("optional-dependencies", {}).items()}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), projects[0]["dependencies"]) if not x.startswith("taxel")))'
 # Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
@@ -122,7 +122,7 @@ fuzz: released $(VENV)/.for-fuzz
 	else echo "make fuzz: leaves out readers: atheris has no wheel for this machine"; fi
 
 # Either build of the extension does. Of pydoclint's rules those hold that need no second place for types.
-SOURCES_OF_PYTHON := python rules/taxel_rules studies/taxel_studies benchmarks/taxel_benchmarks bridge/taxel_bridge viewers/taxel_viewers makers/taxel_makers
+SOURCES_OF_PYTHON := python rules/taxel_rules studies/taxel_studies benchmarks/taxel_benchmarks bridge/taxel_bridge viewers/taxel_viewers makers/taxel_makers gait/taxel_gait
 lint: $(VENV)/.for-test $(VENV)/.for-lint
 	@$(MAKE) --no-print-directory $(if $(wildcard $(VENV)/.released),released,build)
 	cargo fmt --all --check

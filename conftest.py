@@ -68,5 +68,5 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def no_progress_on_a_slow_machine() -> Iterator[None]:
     """Let commands run long before a line of progress, which tests of stderr do not expect."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("taxel.cli._task._REPORT_S", (600.0,))
+        patch.setattr("taxel.cli.task._REPORT_S", (600.0,))
         yield

@@ -25,6 +25,7 @@ UNSIGNED = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0)
 PLAIN = TRAINS.split_by_sign()
 FOUND = taxel.Detections(["a", "b"], [10, 20], [11, 22], [0.5, 0.5])
 TARE = taxel.Tare.take(FRAMES)
+REGION = taxel.Region("two", taxels=((0, 0), (1, 2)))
 CALIBRATION = taxel.Calibration.table(ARRAY, [5.0, 50.0], [1.0, 9.0], unit="N")
 LEVELS = taxel.encode.LevelCrossing([0.5])
 READOUT = taxel.Readout(LEVELS, {"a": (taxel.Neuron(tau=2.0), [0.5] * 32)}, array=ARRAY)
@@ -62,6 +63,7 @@ def write_files() -> None:
     FOUND.to_csv("here.csv")
     TRAINS.save("here.npz")
     TARE.save("here_tare.json")
+    taxel.write_regions("here.regions.json", [REGION])
     CALIBRATION.save("here_calibration.json")
     READOUT.save("here_readout.json")
     RULE.save("here_rule.json")
@@ -130,6 +132,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Fabric": circuit.Fabric,
     "Frames": lambda: FRAMES,
     "Labels": lambda: taxel.Labels("here_labels.csv"),
+    "Region": lambda: REGION,
     "Layer": lambda: simulate.Layer(array=ARRAY),
     "Live": live,
     "LocalLoad": lambda: taxel.encode.LocalLoad(tare=TARE),
@@ -327,6 +330,19 @@ VALUES: dict[str, Callable[[], Any]] = {
     "read_loads.path": lambda: "here_loads.csv",
     "region.x": lambda: slice(0, 2),
     "region.y": lambda: slice(0, 2),
+    "Region.name": lambda: "heel",
+    "Region.shares.array": lambda: ARRAY,
+    "Region.centred.array": lambda: ARRAY,
+    "rectangle.name": lambda: "heel",
+    "rectangle.left": lambda: 0,
+    "rectangle.top": lambda: 0,
+    "rectangle.right": lambda: 4,
+    "rectangle.bottom": lambda: 4.5,
+    "axis.picture": lambda: np.eye(4),
+    "axis.array": lambda: ARRAY,
+    "read_regions.path": lambda: "here.regions.json",
+    "write_regions.path": lambda: "there.regions.json",
+    "write_regions.regions": lambda: [REGION],
     "rest.recording": lambda: taxel.open("pressed.npz"),
     "zero_test.found": lambda: 1.0,
 }
@@ -338,6 +354,8 @@ SMALL: dict[str, dict[str, Any]] = {
     "folds": {"count": 2},
     "pairwise": {"q": 0.1},
     "read_trials": {"window_ms": 0.1},
+    "Region": {"taxels": ((0, 0),)},
+    "write_regions": {"overwrite": True},
     "to_csv": {"overwrite": True},
     "to_nir": {"overwrite": True},
     "save": {"overwrite": True},

@@ -42,7 +42,7 @@ def test_every_python_piece_of_a_page_runs_in_order_and_does_what_the_page_says(
 
 ROOT = DOCS.parent
 PROSE = sorted(page for kind in ("*.md", "docs/*.md", "docs/reference/*.md", "*/README.md") for page in ROOT.glob(kind))
-FOLDERS = "benchmarks|bridge|crates|docs|fuzz|makers|python|rtl|rules|studies|tests|tools|viewers"
+FOLDERS = "benchmarks|bridge|crates|docs|fuzz|gait|makers|python|rtl|rules|studies|tests|tools|viewers"
 _PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w./-]+")
 #: What `make` builds, and a folder of another project.
 ELSEWHERE = ("rtl/build/", "tests/testdata")

@@ -29,7 +29,7 @@ PRODUCT = {
     "taxel-panel": (2_650, "crates/taxel-panel/src"),
     "page": (4_200, "python/taxel/panel/web"),
     "border": (3_450, "crates/taxel-python/src crates/taxel-border/src"),
-    "nouns": (1_950, "__init__ array _event_table events frames spikes tare calibration clock plot"),
+    "nouns": (1_950, "__init__ array _event_table events frames regions spikes tare calibration clock plot"),
     "labels, wire, neuron": (1_170, "labels detections recorded reading verdict wire neuron"),
     "_base": (1_500, "_base"),
     "formats": (2_950, "formats"),

@@ -13,6 +13,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Labels, Note
 from taxel.neuron import Neuron
+from taxel.regions import Axis, Region, axis, read_regions, write_regions
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Array",
+    "Axis",
     "BoardChange",
     "Calibration",
     "Clock",
@@ -65,11 +67,13 @@ __all__ = [
     "ProblemError",
     "Readout",
     "Recording",
+    "Region",
     "SceneError",
     "SpikeTrains",
     "Tare",
     "Verdict",
     "Zeroing",
+    "axis",
     "board_check",
     "convert",
     "cut",
@@ -87,10 +91,12 @@ __all__ = [
     "open_all",
     "panel",
     "plot",
+    "read_regions",
     "simulate",
     "tasks",
     "train",
     "wire",
+    "write_regions",
 ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
+from taxel.regions import Region
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Frames"]
 
+Values: TypeAlias = NDArray[np.float64]
+#: The force in N of a pressure of 1 on 1 mm2, by its unit.
+_NEWTON = {"kPa": 1e-3, "N/cm2": 1e-2}
 #: The largest size of frames made from events: 4 GiB.
 MOST_VALUES = 2**30
 
@@ -179,28 +183,146 @@ class Frames(FrozenColumns):
         first, last = np.searchsorted(self.t, [start, stop])
         return self[int(first) : int(last)]
 
-    def region(self, x: slice, y: slice) -> Frames:
-        """Return the frames of a rectangle of columns `x` and rows `y`, as a smaller array.
+    @overload
+    def region(self, x: slice, y: slice | None = None) -> Frames: ...
+    @overload
+    def region(self, x: Region, *, above: float = 0.0, range_end: float | None = None) -> dict[str, Values]: ...
+    def region(
+        self, x: slice | Region, y: slice | None = None, *, above: float = 0.0, range_end: float | None = None
+    ) -> Frames | dict[str, Values]:
+        """Return the frames of a rectangle of columns `x` and rows `y`, as a smaller array; or what loads a region.
 
         Parameters
         ----------
-        x, y : slice
-            Columns and rows, without a step.
+        x : slice or Region
+            Columns, without a step; or a region.
+        y : slice, optional
+            Rows, without a step; default: all. A region has its own.
+        above : float, in the frames' unit
+            Of a region: a taxel with a greater value is loaded.
+        range_end : float, in the frames' unit, optional
+            Of a region: the value at which the range of a taxel ends.
+
+        Returns
+        -------
+        Frames, or of a region dict from str to float64, shape (n,)
+            By name and unit: ``force_N`` (else ``sum_UNIT``), of the loaded taxels, each by the share of its area that
+            is inside; ``mean_UNIT``, over their area; ``peak_UNIT``, the largest value of a taxel whose middle is
+            inside; ``area_mm2`` (else ``area_taxels``); ``centre_x_UNIT`` and ``centre_y_UNIT``, not of channels;
+            ``at_range_end_taxels``. NaN in frames without a loaded taxel, but for sums, areas and numbers.
 
         Raises
         ------
-        ProblemError : not slices of whole numbers, a slice with a step, or a rectangle without a taxel
+        ProblemError : not slices of whole numbers, a slice with a step, or a rectangle or region without a taxel
 
         Examples
         --------
         >>> Frames([[[1.0, 2.0]]], [0]).region(slice(1, 2), slice(None)).values
         array([[[2.]]], dtype=float32)
+        >>> frames = Frames([[[100.0, 200.0]]], [0], unit="kPa", array=Array(1, 2, pitch_mm=10.0))
+        >>> frames.region(Region.rectangle("half", -5, -5, 10, 5))["force_N"]
+        array([20.])
         """
+        if isinstance(x, Region):
+            return self._loads(x, above, range_end)
+        y = slice(None) if y is None else y
         columns, rows = self.array.region(x, y)
         values = self.values[:, slice(*rows), slice(*columns)]
         if 0 in values.shape[1:]:
             raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} is in it")
         return Frames(values, self.t, unit=self.unit, array=self.array._part(x, y))
+
+    def _loads(self, region: Region, above: float, range_end: float | None) -> dict[str, Values]:
+        """Return what loads a region (`region`)."""
+        array = self.array
+        shares, inside = region.shares(array), region.centred(array)
+        rows, columns = (slice(k.min(), k.max() + 1) for k in np.nonzero(shares))
+        shares, inside = shares[rows, columns], inside[rows, columns]
+        values = self.values[:, rows, columns]
+        loaded = self._loaded(above)[:, rows, columns]
+        areas = array.area_mm2
+        area = np.ones(shares.shape) if areas is None else areas[rows, columns]
+        there = np.einsum("nij,ij->n", loaded, shares * area)
+        weights = np.where(loaded, values, 0.0) * shares
+        force = self._in_n
+        load = np.einsum("nij,ij->n", weights, area if force else np.ones(area.shape))
+        over_area = np.einsum("nij,ij->n", weights, area)
+        peak = np.where(loaded & inside, values, -np.inf).max(axis=(1, 2))
+        unit = self.unit
+        found = {
+            "force_N" if force else f"sum_{unit}": load * (force or 1.0),
+            f"mean_{unit}": np.divide(over_area, there, out=np.full(len(self), np.nan), where=there > 0),
+            f"peak_{unit}": np.where(np.isfinite(peak), peak, np.nan),
+            "area_taxels" if areas is None else "area_mm2": there,
+        }
+        if array.centre_unit is not None:
+            total = weights.sum(axis=(1, 2))
+            for name, place in zip("xy", array.positions(), strict=True):
+                moment = np.einsum("nij,ij->n", weights, place[rows, columns])
+                centre = np.divide(moment, total, out=np.full(len(self), np.nan), where=total > 0)
+                found[f"centre_{name}_{array.centre_unit}"] = centre
+        if range_end is not None:
+            at_end = (values >= finite("range_end", range_end)) & inside
+            found["at_range_end_taxels"] = np.count_nonzero(at_end, axis=(1, 2)).astype(np.float64)
+        return found
+
+    @property
+    def _in_n(self) -> float | None:
+        """The force in N of a value of 1 on 1 mm2; None where the force is not known."""
+        return None if self.array.area_mm2 is None else _NEWTON.get(self.unit)
+
+    def force(self) -> Values | None:
+        """Return the force of each frame, N, shape (n,); None where neither unit nor areas tell it.
+
+        Examples
+        --------
+        >>> Frames([[[100.0, 200.0]]], [0], unit="kPa", array=Array(1, 2, pitch_mm=10.0)).force()
+        array([30.])
+        """
+        if self.unit == "N":
+            return self.total()
+        areas, factor = self.array.area_mm2, self._in_n
+        if areas is None or factor is None:
+            return None
+        return np.asarray(np.einsum("nij,ij->n", self.values, areas, dtype=np.float64) * factor)
+
+    def maximum(self) -> NDArray[np.float32]:
+        """Return the largest value of each taxel, shape (rows, columns): the maximum picture; NaN without a value.
+
+        Examples
+        --------
+        >>> Frames([[[1.0, 2.0]], [[3.0, 0.0]]], [0, 100]).maximum()
+        array([[3., 2.]], dtype=float32)
+        """
+        if not len(self):
+            raise ProblemError("no frame has no maximum picture")
+        return np.asarray(np.fmax.reduce(self.values, axis=0))
+
+    def centre_path(self, share: float = 0.02) -> Values:
+        """Return the path of the centre of pressure: `centre`, NaN while the sum is at most a share of its largest.
+
+        Parameters
+        ----------
+        share : float, 0 to 1
+            With few taxels loaded, as when a foot leaves the ground, the centre jumps.
+
+        Returns
+        -------
+        float64, shape (n, 2), in the array's `centre_unit`
+
+        Raises
+        ------
+        ProblemError : channels, which have no centre; a share outside 0 to 1
+
+        Examples
+        --------
+        >>> Frames([[[0.0, 1.0]], [[90.0, 10.0]]], [0, 100], array=Array(1, 2, pitch_mm=5.0)).centre_path()[:, 0]
+        array([nan, 0.5])
+        """
+        least = finite("share", share, least=0.0, most=1.0)
+        total = self.total()
+        counts = total > least * np.nanmax(total, initial=0.0)
+        return np.where(counts[:, None], self.centre(), np.nan)
 
     @classmethod
     def _joined(cls, tables: Sequence[Frames]) -> Frames:

@@ -10,7 +10,7 @@ import taxel_studies
 
 ROOT = Path(taxel_studies.__file__).parents[2]
 #: The folders of distributions beside taxel, which hold a package of this name each.
-BESIDE = ("studies", "benchmarks", "viewers", "bridge", "makers", "rules")
+BESIDE = ("studies", "benchmarks", "viewers", "bridge", "makers", "gait", "rules")
 
 
 def test_taxel_imports_none() -> None:

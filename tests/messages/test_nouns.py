@@ -8,7 +8,7 @@ import numpy as np
 from refusal import messages
 
 import taxel
-from taxel import Array, Calibration, Detections, Events, Frames, Labels, Load, Places, SpikeTrains, Tare
+from taxel import Array, Calibration, Detections, Events, Frames, Labels, Load, Places, Region, SpikeTrains, Tare
 from taxel._base.errors import helped
 
 ARRAY = Array(2, 2)
@@ -62,6 +62,16 @@ PLACES: dict[str, Callable[[], object]] = {
     "frames of events, values": lambda: Frames.from_events(Events(**EVENTS), 100),
     "frames, backwards": lambda: Frames(np.zeros((2, 2, 2)), [0, 1])[::-1],
     "frames, region": lambda: still().region(slice(1, 1), slice(None)),
+    "region, nothing": lambda: Region("a"),
+    "region, no name": lambda: Region("", taxels=((0, 0),)),
+    "region, corners": lambda: Region("a", ((0, 0), (1, 1))),
+    "region, pairs": lambda: Region("a", ((0, 0, 1), (1, 1, 1))),
+    "region, crossing": lambda: Region("a", ((0, 0), (9, 9), (9, 0), (0, 9))),
+    "region, off": lambda: Region.rectangle("a", 9, 9, 12, 12, "taxels").shares(ARRAY),
+    "region, taxel": lambda: Region("a", taxels=((0, 5),)).shares(ARRAY),
+    "region, unit": lambda: Region.rectangle("a", 0, 0, 1, 1).shares(ARRAY),
+    "region, channels": lambda: Region.rectangle("a", 0, 0, 1, 1).shares(Array(1, 8)),
+    "axis": lambda: taxel.axis([[0, 1], [0, 1]], ARRAY),
     "trains, between": lambda: TRAINS.between(3, 2),
     "trains, place": lambda: TRAINS.select([-1]),
     "trains, no delay": lambda: TRAINS.delayed([]),

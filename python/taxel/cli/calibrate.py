@@ -12,8 +12,8 @@ from taxel._base.arguments import text
 from taxel._base.files import beside, named
 from taxel._core import ProblemError
 from taxel.calibration._loads import UNITS
-from taxel.cli._task import OutOption, Output, progress, say_warnings
 from taxel.cli.app import App, Flat
+from taxel.cli.task import OutOption, Output, progress, say_warnings
 from taxel.options import CalibrateOptions, Reading
 
 app = App(name="calibrate")

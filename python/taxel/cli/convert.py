@@ -15,7 +15,8 @@ import taxel
 from taxel._base.files import check_writable
 from taxel._base.parallel import Workers
 from taxel._core import ProblemError
-from taxel.cli._task import (
+from taxel.cli.app import App, Flat
+from taxel.cli.task import (
     OutArgument,
     Output,
     SourceOption,
@@ -23,7 +24,6 @@ from taxel.cli._task import (
     progress,
     say_failures,
 )
-from taxel.cli.app import App, Flat
 from taxel.options import FullReading
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ import taxel
 from taxel._base.messages import plain
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
-from taxel.cli._task import OutArgument, Output, SourceOption, of_source
 from taxel.cli.app import App, Flat, Limits
+from taxel.cli.task import OutArgument, Output, SourceOption, of_source
 from taxel.options import Reading
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from cyclopts import Parameter
 
 from taxel._base.messages import counted
 from taxel.cli._say import say
-from taxel.cli._task import progress
 from taxel.cli.app import App, JsonOption, Limits
+from taxel.cli.task import progress
 from taxel.demo.script import TRAINING_SEED
 from taxel.spikes import to_ms
 

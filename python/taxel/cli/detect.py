@@ -16,8 +16,8 @@ from taxel._base.messages import collected
 from taxel._base.parallel import Workers
 from taxel._base.times import begun
 from taxel.cli._say import say
-from taxel.cli._task import OutOption, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import App, Flat
+from taxel.cli.task import OutOption, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.detections import Detections
 from taxel.options import DetectOptions, Reading
 from taxel.spikes import to_ms

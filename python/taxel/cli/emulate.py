@@ -20,9 +20,9 @@ from taxel._base.messages import counted
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._say import say
-from taxel.cli._task import progress
 from taxel.cli.app import App, Flat, JsonOption, Limits
 from taxel.cli.console import Console
+from taxel.cli.task import progress
 from taxel.demo.script import TRAINING_SEED, endless, script
 from taxel.live.sending import PORT
 from taxel.options import settings

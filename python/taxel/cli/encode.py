@@ -6,8 +6,8 @@ from pathlib import Path
 
 import taxel
 from taxel._core import ProblemError
-from taxel.cli._task import OutArgument, Output, progress, say_warnings
 from taxel.cli.app import App, Flat
+from taxel.cli.task import OutArgument, Output, progress, say_warnings
 from taxel.options import EncodeOptions, Reading
 
 app = App(name="encode")

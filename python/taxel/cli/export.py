@@ -10,8 +10,8 @@ from cyclopts import Parameter
 import taxel
 from taxel._base.messages import installing
 from taxel._core import Error
-from taxel.cli._task import OutArgument, Output
 from taxel.cli.app import App, Flat
+from taxel.cli.task import OutArgument, Output
 
 app = App(name="export", help="Write a readout for other simulators and for chips.")
 

@@ -23,9 +23,9 @@ from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._say import say
-from taxel.cli._task import Output, progress, say_failures, say_warnings
 from taxel.cli._topics import list_topics
 from taxel.cli.app import OUTSIDE, App, Flat
+from taxel.cli.task import Output, progress, say_failures, say_warnings
 from taxel.clock import doubt
 from taxel.options import FullReading
 
@@ -48,6 +48,7 @@ def info(
     *,
     table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     tare: Annotated[str | None, Parameter(metavar="SECONDS|FILE")] = None,
+    regions: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     each: bool = False,
     workers: Flat[Workers] = Workers(),
     reading: Flat[FullReading] = FullReading(),
@@ -68,10 +69,13 @@ def info(
     file
         A recording, a file of a sensor's maker, or a folder.
     table
-        Write contact area, peak, sum and centre of pressure over time to this .csv.
+        Write contact area, peak, sum and centre of pressure over time to this .csv; with --regions those of each region
+        too.
     tare
         The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
         rest at the beginning. Default: measured in a quiet part of the recording.
+    regions
+        Measure the load of each region of this .json, such as NAME.regions.json (docs/files.md).
     each
         Print all facts about each recording of a folder.
     """
@@ -83,9 +87,10 @@ def info(
     if table is not None and table.suffix.lower() != ".csv":
         raise ProblemError(f"{table}: the name of a table must end in .csv")
     output.check(table)
+    parts = () if regions is None else taxel.read_regions(regions)
     as_json = output.json
     files = recordings_in(file, reading.layout) if file.exists() and is_folder(file) else []
-    if len(files) > 1 and table is None:
+    if len(files) > 1 and table is None and regions is None:
         return _of_files(file, files, partial(_infos, reading, tare), workers, each=each, as_json=as_json)
     with progress(as_json) as show:
         show(f"reading {file}", 0, 0)
@@ -95,7 +100,7 @@ def info(
         recordings = reading.open_trials(file)
         recording = recordings[0]
         if len(recordings) > 1 or len(recording.sources) > 1:
-            if table is not None:
+            if table is not None or regions is not None:
                 raise ProblemError(_several(file, recordings))
             infos = [taxel.tasks.info(each, tare) for each in recordings]
             of_each = [found.facts for found in infos]
@@ -105,7 +110,7 @@ def info(
                 say(f"labels of these trials need a column recording with the trial's name, for example {example}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return _code(of_each)
-        found = taxel.tasks.info(recording, tare)
+        found = taxel.tasks.info(recording, tare, parts)
         facts, pressed = found.facts, found.pressed
         facts["array_assumed"] &= not reading.array
     say_warnings(found.warnings)
@@ -235,7 +240,9 @@ def _pages(facts: dict[str, Any]) -> list[str]:
 def _lines(pressed: Series) -> Iterator[str]:
     """Yield the lines of a table of pressure over time; the centre is empty where nothing is loaded."""
     columns = {name: values for name, values in pressed.columns.items() if name != "force_N"}
-    yield ",".join(["t_us", *columns])
+    for region, loads in pressed.regions.items():
+        columns |= {f"{region} {name}": values for name, values in loads.items()}
+    yield ",".join(["t_us", *(f'"{name}"' if "," in name else name for name in columns)])
     for t, *values in zip(*(column.tolist() for column in (pressed.t, *columns.values())), strict=True):
         yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])
 
@@ -375,6 +382,9 @@ def _pressure(pressed: dict[str, Any], begin_us: int, *, timed: bool) -> Iterato
         if pressed.get(f"centre_{unit}") is not None:
             x, y = (f"{low:.1f} to {high:.1f}{more}" for low, high in pressed[f"centre_{unit}"].values())
             yield "centre of pressure", f"{across} {x}, {down} {y}"
+    for region, loads in pressed["regions"].items():
+        most = (f"{name.partition('_')[0]} {value:g} {name.partition('_')[2]}" for name, value in loads.items())
+        yield f"region {region}", f"at most {', '.join(most)}, of taxels above {pressed['above']:g} {pressed['unit']}"
 
 
 def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

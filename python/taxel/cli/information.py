@@ -11,8 +11,8 @@ import taxel
 from taxel._base.messages import counted
 from taxel._base.parallel import Workers
 from taxel._core import ProblemError
-from taxel.cli._task import Output, progress, say_warnings
 from taxel.cli.app import App, Flat
+from taxel.cli.task import Output, progress, say_warnings
 from taxel.options import InformationOptions, Reading
 
 if TYPE_CHECKING:

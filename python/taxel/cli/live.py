@@ -21,7 +21,6 @@ from taxel._core import FIREWALL, DeviceError, ProblemError
 from taxel.array import Array
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
-from taxel.cli._task import Output
 from taxel.cli.app import App, Flat, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
@@ -35,6 +34,7 @@ from taxel.cli.board import (
     with_live_options,
 )
 from taxel.cli.console import Console
+from taxel.cli.task import Output
 from taxel.detect import PlainRule, Readout
 from taxel.detect.board import differences
 from taxel.device import Cable

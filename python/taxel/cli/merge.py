@@ -8,8 +8,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 import taxel
-from taxel.cli._task import Output
 from taxel.cli.app import App, Flat, Limits
+from taxel.cli.task import Output
 from taxel.options import Reading
 
 app = App(name="merge")

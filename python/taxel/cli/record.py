@@ -18,7 +18,6 @@ from taxel._base.messages import counted
 from taxel._core import FIREWALL, ProblemError
 from taxel.cli._noting import noting
 from taxel.cli._say import say
-from taxel.cli._task import OutArgument
 from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
@@ -32,6 +31,7 @@ from taxel.cli.board import (
     with_live_options,
 )
 from taxel.cli.console import Console
+from taxel.cli.task import OutArgument
 from taxel.live import Live, Summary
 
 app = App(name="record")

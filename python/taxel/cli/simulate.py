@@ -11,8 +11,8 @@ import taxel
 from taxel._base.files import write_whole
 from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
-from taxel.cli._task import OutOption, Output, progress
 from taxel.cli.app import App, Flat, Limits
+from taxel.cli.task import OutOption, Output, progress
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.reading import Facts, InMemory, Marks
 from taxel.simulate import Scene, SceneFile

@@ -13,8 +13,8 @@ import taxel
 from taxel._base.messages import collected
 from taxel._base.parallel import Workers
 from taxel.cli._say import say
-from taxel.cli._task import OutArgument, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import OUTSIDE, App, Flat
+from taxel.cli.task import OutArgument, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.options import Reading, TrainOptions
 
 app = App(name="train")

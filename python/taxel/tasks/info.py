@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import instance
+from taxel._base.arguments import instance, several
 from taxel._base.messages import collected, counted
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
@@ -18,6 +18,7 @@ from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series, series
 from taxel.recording.analysis.rest import of_frames, rest
 from taxel.recording.analysis.summary import summary
+from taxel.regions import Region
 from taxel.spikes import SpikeTrains
 from taxel.tare import GivenTare
 
@@ -47,7 +48,7 @@ class Info:
         return self.facts | {"warnings": list(self.warnings)}
 
 
-def info(recording: Recording, tare: GivenTare | None = None) -> Info:
+def info(recording: Recording, tare: GivenTare | None = None, regions: Sequence[Region] = ()) -> Info:
     """Summarise a recording, or each of its sources.
 
     ``taxel info`` calls this function.
@@ -58,10 +59,12 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
     tare : Tare, path or float (s), optional
         The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning.
         Default: that of a quiet stretch.
+    regions : sequence of Region
+        Those whose load is measured too, of a recording of one sensor.
 
     Raises
     ------
-    ProblemError : a tare that does not fit
+    ProblemError : a tare or a region that does not fit
 
     Examples
     --------
@@ -74,12 +77,13 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
     {'most': 9.0, 't_us': 10000}
     """
     instance("recording", recording, Recording)
+    parts = [instance("regions", region, Region) for region in several("regions", regions)]
     with collected() as warnings:
         if len(recording.sources) > 1:
             found = Info(_sources(recording, tare), None)
         else:
             given = None if tare is None else rest(recording, tare)
-            pressed = series(recording, given)
+            pressed = series(recording, given, parts)
             found = Info(summary(recording, pressed), pressed)
     return replace(found, warnings=tuple(warnings))
 

@@ -64,7 +64,9 @@ def trials(path: Path) -> Iterator[Trial]:
         line = back[0] + 2 if len(back) else 1
         raise FormatError(f"{path.name}, line {line}: must have 2 lines or more, whose times ascend")
     known, people = table(path.parent / "events.csv"), table(path.parent / "people.csv")
-    speeds = people["speed_m_s"][people["person"] == person].dropna().tolist() if len(people) else []
+    # A table of people of the same name may be a user's own.
+    has_speeds = {"person", "speed_m_s"} <= {*people}
+    speeds = people["speed_m_s"][people["person"] == person].dropna().tolist() if has_speeds else []
     for k, foot in enumerate(("left", "right")):
         total = values[:, 17 + k]
         own = known[(known["person"] == person) & (known["foot"] == foot)] if len(known) else known

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.calibration._curves import N_PER_KPA_MM2
+from taxel.array import Array
 from taxel.encode import ContactArea
 from taxel.frames import Frames
 from taxel.recording.analysis.quiet import Readings, held_values, interval
 from taxel.recording.analysis.rest import Rest, loaded_from, rest
 from taxel.recording.frames import FRAMES_HZ, period_us
 from taxel.recording.recording import Recording
+from taxel.regions import Region
 from taxel.tare import Tare
 
 #: The most frames of a long recording of events, as a plot resolves no more points, and the most values of them.
@@ -39,9 +40,11 @@ class Series:
         By name and unit, as ``peak_kPa``: `area` (mm2, or taxels where their area is not known); the largest value,
         `peak`; the `sum` of the loaded taxels, 0 without one, and of all where `above` is 0; `centre_x` and `centre_y`
         (`Array.centre_unit`), NaN in frames without a loaded taxel;
-        `force` (N), of values in kPa whose areas are known. Channels have neither area nor centre.
+        `force` (N), of pressures whose areas are known. Channels have neither area nor centre.
     rest : Rest
         What was subtracted.
+    regions : dict from str to dict from str to float64, shape (n,)
+        What loads the whole sensor and each region (`Frames.region`), where regions are given.
     """
 
     t: NDArray[np.int64]
@@ -49,9 +52,10 @@ class Series:
     above: float
     columns: dict[str, NDArray[np.float64]]
     rest: Rest
+    regions: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
 
     @classmethod
-    def from_frames(cls, frames: Frames, above: float, rest: Rest) -> Series:
+    def from_frames(cls, frames: Frames, above: float, rest: Rest, regions: Sequence[Region] = ()) -> Series:
         """Return the series of frames above rest."""
         array = frames.array
         block = max(1, _BLOCK // max(1, array.rows * array.columns))
@@ -74,23 +78,24 @@ class Series:
             centre = over(lambda block: block.centre(above))
             columns = {"area_mm2" if in_mm2 else "area_taxels": area, **columns}
             columns |= {f"centre_{axis}_{array.centre_unit}": centre[:, k] for k, axis in enumerate("xy")}
-        if (force := force_n(frames)) is not None:
+        if frames.unit != "N" and (force := frames.force()) is not None:
             columns["force_N"] = force
-        return cls(frames.t, frames.unit, above, columns, rest)
+        loads = {}
+        for region in [_whole(array), *regions] if regions else []:
+            of_blocks = [block.region(region, above=above) for block in blocks]
+            loads[region.name] = {name: np.concatenate([one[name] for one in of_blocks]) for name in of_blocks[0]}
+        return cls(frames.t, frames.unit, above, columns, rest, loads)
 
 
-def force_n(frames: Frames) -> NDArray[np.float64] | None:
-    """Return the force of each frame in kPa, N, from each taxel's area; None in another unit or of unknown area."""
-    areas = frames.array.area_mm2
-    if frames.unit != "kPa" or areas is None:
-        return None
-    return np.asarray(np.einsum("nij,ij->n", frames.values, areas, dtype=np.float64) * N_PER_KPA_MM2)
+def _whole(array: Array) -> Region:
+    """Return the region of all taxels."""
+    return Region("whole", taxels=tuple((int(x), int(y)) for y, x in np.argwhere(array._there())))
 
 
-def series(recording: Recording, taken: Rest | None = None) -> Series | None:
+def series(recording: Recording, taken: Rest | None = None, regions: Sequence[Region] = ()) -> Series | None:
     """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities."""
     result = above_rest(recording, taken)
-    return None if result is None else Series.from_frames(*result)
+    return None if result is None else Series.from_frames(*result, regions)
 
 
 def _frames(recording: Recording) -> Frames:

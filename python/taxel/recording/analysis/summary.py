@@ -139,6 +139,10 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     if not len(pressed.t):
         return None
     facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
+    facts["regions"] = {
+        region: {name: float(np.nanmax(values, initial=0.0)) for name, values in loads.items() if "centre" not in name}
+        for region, loads in pressed.regions.items()
+    }
     for name, values in pressed.columns.items():
         kind, _, unit = name.partition("_")
         if kind == "centre":

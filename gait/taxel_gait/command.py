@@ -1,0 +1,191 @@
+"""``taxel steps``: the steps of insoles as tables and a page."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+import taxel
+from taxel.cli.app import WRONG_INPUT, App, Flat, say
+from taxel.cli.task import Output, progress, say_warnings
+from taxel.options import Reading
+from taxel.tasks import Workers
+from taxel_gait import kept, running
+from taxel_gait.cohort import Cohort, Entry
+from taxel_gait.measures import CENTRE
+from taxel_gait.measuring import Measured, StepOptions, measure
+from taxel_gait.tables import SYMMETRIES, Table, columns_of, curves, summary, symmetry
+
+app = App(name="steps")
+
+#: Where results are written if no folder is given.
+FOLDER = Path("taxel-steps")
+_TABLES = ("steps.csv", "summary.csv", "symmetry.csv", "curves.csv")
+_PAGE = "report.html"
+#: Columns that insoles leave empty, and a plate's footprints do not.
+_EMPTY = ("saturated_cells", "cpei_pct", "arch_index")
+
+
+@app.default
+def steps(
+    paths: list[Path],
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(name=("--out", "-o"), metavar="FOLDER")] = None,
+    decimal_comma: bool = False,
+    options: Flat[StepOptions] = StepOptions(),
+    workers: Flat[Workers] = Workers(),
+    reading: Flat[Reading] = Reading(),
+    output: Flat[Output] = Output(),
+) -> int:
+    """Measure the steps of insoles: tables, mean curves over stance, and a page that prints.
+
+    Writes steps.csv (a row a step), summary.csv (by person, foot and condition), symmetry.csv, curves.csv and
+    report.html, and for each recording NAME.steps.csv: contacts and lifts as labels. What is taken out there stays
+    out in the next run. Files that cannot be read are named at the end, with exit code 2. A run that was stopped goes
+    on where it was.
+
+    Example: taxel steps walk.txt
+    Example: taxel steps left.asf right.asf --same-clock
+    Example: taxel steps insole_gaitpdb -o results --jobs 2
+
+    Parameters
+    ----------
+    paths
+        A recording of one foot or both; the left and the right foot's recording; or a folder, with people.csv or
+        without.
+    out
+        The folder for all that is written. Default: taxel-steps, and NAME.steps.csv beside each recording.
+    decimal_comma
+        Write decimal commas, with semicolons between cells.
+    """
+    from taxel_gait.report import write_report  # noqa: PLC0415  jinja2 loads slowly
+
+    cohort = Cohort.of(paths, reading.layout)
+    folder = FOLDER if out is None else out
+    folder.mkdir(parents=True, exist_ok=True)
+    output.check(*(folder / name for name in (*_TABLES, _PAGE)))
+    label_tables = [_label_tables(entry, out) for entry in cohort.entries]
+    by_entry = dict(zip(cohort.entries, label_tables, strict=True))
+    stamps = [running.stamp(one, [*one.paths, *of], options, reading) for one, of in by_entry.items()]
+    with progress(output.json) as show:
+        work = partial(_measure, by_entry, options, reading)
+        found, failed = running.run(cohort.entries, work, stamps, folder, workers, show)
+    measured = {
+        entry: Measured.from_dict(one) for entry, one in zip(cohort.entries, found, strict=True) if one is not None
+    }
+    for entry, one in measured.items():
+        for table, labels in zip(by_entry[entry], one.labels, strict=True):
+            table.parent.mkdir(parents=True, exist_ok=True)
+            kept.write(table, labels)
+    rows = [row for one in measured.values() for row in one.rows]
+    say_warnings(dict.fromkeys(text for one in measured.values() for text in one.warnings))
+    left_out = {**cohort.left_out, **failed}
+    say(*(f"taxel: {why if name in why else f'{name}: {why}'}" for name, why in left_out.items()), err=True)
+    if not rows:
+        running.clear(folder)
+        say(f"taxel: {cohort.place}: no step was found, so no table is written", err=True)
+        return WRONG_INPUT
+    definitions = list(dict.fromkeys(words for one in measured.values() for words in one.definitions))
+    about = _about(list(measured.values()), definitions, rows, left_out)
+    over_stance = [curve for one in measured.values() for curve in one.curves]
+    written = _write(folder, about, rows, over_stance, decimal_comma=decimal_comma, overwrite=output.overwrite)
+    write_report(folder / _PAGE, about, definitions, rows, over_stance, overwrite=output.overwrite)
+    running.clear(folder)
+    used = Counter(row["used"] for row in rows)
+    people = len({(row["person"], row["condition"]) for row in rows})
+    output.say(
+        {
+            "recordings": len(measured),
+            "people": len({row["person"] for row in rows}),
+            "steps": len(rows),
+            "used": dict(used),
+            "left_out": left_out,
+            "written": [str(path) for path in (*written, folder / _PAGE)],
+        },
+        f"{len(measured)} of {len(cohort.entries)} recordings, {len(rows)} steps, of which {used['yes']} are in means: "
+        + ", ".join(f"{count} {name}" for name, count in used.items() if name != "yes"),
+        *_lines(summary(rows)) * (people == 1),
+        f"written to {folder}: {', '.join((*_TABLES, _PAGE))}",
+        f"labels: {by_entry[next(iter(measured))][0]}" + " ..." * (len(measured) > 1),
+    )
+    return WRONG_INPUT if left_out else 0
+
+
+def _label_tables(entry: Entry, out: Path | None) -> list[Path]:
+    """Return where the table of labels of each file is."""
+    if out is None:
+        return [path.with_name(f"{Path(path.name.removesuffix('.gz')).stem}.steps.csv") for path in entry.paths]
+    if len(entry.paths) > 1:
+        return [out / f"{path.stem}.steps.csv" for path in entry.paths]
+    return [out / f"{entry.name}.steps.csv"]
+
+
+def _measure(tables: dict[Entry, list[Path]], options: StepOptions, reading: Reading, entry: Entry) -> dict[str, Any]:
+    return measure(entry, options, reading, tables[entry]).to_dict()
+
+
+def _about(
+    measured: Sequence[Measured],
+    definitions: Sequence[str],
+    rows: Sequence[dict[str, Any]],
+    left_out: dict[str, str],
+) -> list[str]:
+    """Return what stands above the names of each table."""
+    used = Counter(row["used"] for row in rows)
+    reasons = {name: why for one in measured for name, why in one.reasons.items()}
+    return [
+        f"taxel {taxel.__version__}, taxel steps",
+        *definitions,
+        "turn or unusual: a stride or a stance off the running median of 11 by more than 3 robust SD and 8 %; turn: "
+        "two or more of them within 2.5 s",
+        "a bout ends where both feet are loaded for over 1 s, at a gap, and at two contacts of one foot in a row",
+        "peaks: the largest load of either half of stance, the valley is the least between; loading rate: from 20 to "
+        f"80 % of the maximum; path of the centre (cop): where the load is above {100 * CENTRE:g} % of its maximum",
+        f"means are of {used['yes']} steps that are used; left out: "
+        + (", ".join(f"{count} {name}" for name, count in used.items() if name != "yes") or "none"),
+        *(f"empty: {name}: {why}" for name, why in reasons.items()),
+        *(f"not measured: {name}: {why}" for name, why in left_out.items()),
+    ]
+
+
+def _write(
+    folder: Path,
+    about: list[str],
+    rows: list[dict[str, Any]],
+    over_stance: Sequence[Sequence[float] | None],
+    *,
+    decimal_comma: bool,
+    overwrite: bool,
+) -> list[Path]:
+    """Write the tables; return their paths."""
+    summed, group = summary(rows), ["person", "condition"]
+    of_curves = [
+        {"person": person, "condition": condition, "foot": foot, "stance_pct": pct, "n": n, "mean": m, "sd": s}
+        for (person, condition, foot), (n, mean, sd) in curves(rows, over_stance).items()
+        for pct, (m, s) in enumerate(zip(mean.tolist(), sd.tolist(), strict=True))
+    ]
+    load = next((name for row in rows for name in row if name.startswith("mean_")), "mean").removeprefix("mean_")
+    tables = [
+        Table(about, columns_of(rows, _EMPTY), rows),
+        Table(about, [*group, "foot", "measure", "n", "mean", "sd", "cv_pct"], summed),
+        Table(about, [*group, "measure", "left", "right", *SYMMETRIES], symmetry(summed)),
+        Table([*about, f"the load over stance: {load}"], [*group, "foot", "stance_pct", "n", "mean", "sd"], of_curves),
+    ]
+    paths = [folder / name for name in _TABLES]
+    for path, table in zip(paths, tables, strict=True):
+        table.write(path, decimal_comma=decimal_comma, overwrite=overwrite)
+    return paths
+
+
+def _lines(summed: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the summary of one person as lines."""
+    return [
+        f"  {one['foot']:<6} {one['measure']:<28} {one['mean']:>10.4g}  SD {one['sd']:<9.2g} n {one['n']}"
+        for one in summed
+    ]

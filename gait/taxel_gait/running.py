@@ -1,0 +1,98 @@
+"""Works through many recordings: by processes or a cluster, and after a stop on from where it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import warnings
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import taxel
+from taxel.report import write_whole
+from taxel.tasks import Workers
+from taxel_gait.cohort import Entry
+
+__all__ = ["run", "stamp"]
+
+#: The folder of what is known so far of a run that has not ended.
+PARTS = ".parts"
+
+Work = Callable[[Entry], dict[str, Any]]
+
+
+def run(
+    entries: Sequence[Entry],
+    work: Work,
+    stamps: Sequence[str],
+    folder: Path,
+    workers: Workers,
+    show: Callable[[str, int, int], object],
+) -> tuple[list[dict[str, Any] | None], dict[str, str]]:
+    """Return what each recording gave, None where it failed, and why some failed.
+
+    What is known so far is kept in the folder until `clear`, so that a run that was stopped goes on.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+    work : function of an Entry
+        It returns plain values for JSON, and can be pickled.
+    stamps : sequence of str
+        Which results are the same (`stamp`).
+    folder : Path
+    workers : Workers
+    show : function of a step, how many are done, and how many there are
+    """
+    parts = folder / PARTS
+    parts.mkdir(exist_ok=True)
+    files = [parts / f"{one}.json" for one in stamps]
+    found: list[dict[str, Any] | None] = [json.loads(file.read_text()) if file.exists() else None for file in files]
+    wanted = [k for k, one in enumerate(found) if one is None]
+    failed, done = dict[str, str](), len(entries) - len(wanted)
+    for at, (result, failure) in workers.run(partial(_tried, work), [entries[k] for k in wanted]):
+        k, done = wanted[at], done + 1
+        show(entries[k].name, done, len(entries))
+        if result is None:
+            failed[entries[k].name] = failure
+            continue
+        found[k] = result
+        text = json.dumps(result).encode()
+        write_whole(files[k], lambda file, text=text: file.write(text), overwrite=True)  # type: ignore[misc]
+    return found, {entry.name: failed[entry.name] for entry in entries if entry.name in failed}
+
+
+def clear(folder: Path) -> None:
+    """Forget what was kept of a run."""
+    shutil.rmtree(folder / PARTS, ignore_errors=True)
+
+
+def stamp(entry: Entry, files: Sequence[Path], *how: object) -> str:
+    """Return a name of a result: another where a file, or how it is measured, is another.
+
+    Parameters
+    ----------
+    entry : Entry
+    files : sequence of Path
+        What the result depends on; they need not exist.
+    *how : object
+        Whose texts say how it is measured.
+    """
+    stats = [(file.stat().st_size, file.stat().st_mtime_ns) if file.exists() else None for file in files]
+    text = repr((taxel.__version__, entry, stats, how))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _tried(work: Work, entry: Entry) -> tuple[dict[str, Any] | None, str]:
+    """Return what the work gives with its warnings, or why it failed."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            result = work(entry)
+        except (taxel.Error, OSError, MemoryError) as error:
+            return None, str(error) or type(error).__name__
+    result["warnings"] = [*dict.fromkeys(str(one.message) for one in said), *result.get("warnings", ())]
+    return result, ""
