@@ -34,7 +34,7 @@ def test_what_is_asked_for_is_loaded_and_no_more():
     loaded = {step: set(names) for step, names in json.loads(ran.stdout).items()}
     assert not SLOW & loaded["import"]
     shared = {"taxel.cli.app", "taxel.cli.console"}
-    for step, commands in (("--help", set()), ("trian", set()), ("info --help", {"taxel.cli.info"})):
+    for step, commands in (("--help", set()), ("trian", set()), ("info --help", {"taxel.cli.info", "taxel.cli.task"})):
         found = {name for name in loaded[step] if name.startswith("taxel.cli.") and "._" not in name}
         assert found - shared == commands
         assert not loaded[step] & {"taxel_studies", "taxel_benchmarks", "scipy", "matplotlib"}
