@@ -19,13 +19,14 @@ from taxel.formats.form import Form, left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
+from taxel.formats.parts import KEYS
 from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named
 from taxel.formats.times import ISO, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, that one counts lines, and what values stay.
 _ASCENDS, _COUNTS, _STAYS = 8, 20, 40
-#: So many different texts are names of sensors, not remarks; so many whole values are those of labels.
-_KEYS, _LABELS = 16, 5
+#: So many whole values are those of labels.
+_LABELS = 5
 #: Of so many columns each block is tried as the parts of a total; of more those that begin at the first.
 _BLOCKS = 64
 #: So many columns with names that differ in a number are a series.
@@ -305,7 +306,7 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
     """Yield what a column is that is no taxel, and why, by its cells or its name; the first with a reason counts."""
     fit, name = draft.fit, draft.names[column]
     kind, cells = fit.types[column], [cell for cell in fit.cells(column) if cell not in MISSING]
-    few, reads = len(set(cells)) <= _KEYS, f"; label_column = {draft.called(column)!r} reads them"
+    few, reads = len(set(cells)) <= KEYS, f"; label_column = {draft.called(column)!r} reads them"
     of_time = time_unit(name) is not None and len(name) > 1
     if kind == "day":
         yield "no taxel", "a date"
@@ -491,7 +492,7 @@ def say_contradictions(draft: Draft, text: Text) -> None:
     fit = draft.fit.over(text.spread) if few else draft.fit
     for k in few:
         later = {cells[k] for cells in fit.spread} - {*fit.cells(k)} - {*MISSING}
-        if len(later) > _KEYS:
+        if len(later) > KEYS:
             draft.said.append(
                 f"{draft.called(k)} has {len(later)} other values in later lines, as {named(sorted(later)[:2])}"
             )
