@@ -21,7 +21,7 @@ from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
 from taxel.formats.parts import KEYS
 from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named
-from taxel.formats.times import ISO, unit_of_times
+from taxel.formats.times import ISO, ODD, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, that one counts lines, and what values stay.
 _ASCENDS, _COUNTS, _STAYS = 8, 20, 40
@@ -457,11 +457,12 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
         at, steps = taxels.index(k), np.diff(fit.numbers(k))
         numbers = whole[:, at]
         values, few = set(numbers[np.isfinite(numbers)].tolist()), len(steps) < _COUNTS
+        is_total = not few and _is_total(whole, at)
         if not few and time is not None and _rises(fit, k) and _is_even(fit.numbers(k)):
             _ask_of_two_times(draft, time, k)
         elif not few and (steps == 1).mean() >= 0.95:
             draft.be("counter", "counts up by one", k)
-        elif not few and _is_total(numbers, np.delete(whole, at, axis=1)):
+        elif is_total:
             draft.be("total", "the sum or mean of others", k)
         elif not few and len(values) == 1:
             draft.be("taxel", f"always {fit.cells(k)[0]}", k)
@@ -476,6 +477,8 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
         elif draft.names[k] and len(series) >= _SERIES:
             draft.be("taxel", "named otherwise than the others", k, certainty=OPEN)
             strays.append(k)
+        if fit.spread and not (few or is_total) and _is_total(whole[: len(fit.body)], at):
+            draft.said.append(f"{draft.called(k)} is the sum or mean of others in the first lines alone")
     if asked := [*labels, *strays]:
         called, out = [draft.called(k) for k in labels], [draft.called(k) for k in strays]
         choices: dict[str, Changes] = {f"leave out {named([*map(str, [*called, *out])])}": {"left": out}}
@@ -487,15 +490,21 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
 
 
 def say_contradictions(draft: Draft, text: Text) -> None:
-    """Say which columns that hold labels or a key by the first lines have many other values later."""
-    few = [k for k, role in enumerate(draft.roles) if role.role in ("label", "sensor") and role.certainty == LIKELY]
-    fit = draft.fit.over(text.spread) if few else draft.fit
-    for k in few:
-        later = {cells[k] for cells in fit.spread} - {*fit.cells(k)} - {*MISSING}
-        if len(later) > KEYS:
-            draft.said.append(
-                f"{draft.called(k)} has {len(later)} other values in later lines, as {named(sorted(later)[:2])}"
-            )
+    """Say which columns hold in later lines what contradicts their role by the first: labels, keys, times, counters."""
+    fit = draft.fit
+    texts = {k for k, role in enumerate(draft.roles) if role.role in ("label", "sensor") and role.certainty == LIKELY}
+    rising = {k for k, role in enumerate(draft.roles) if role.role in ("time", "counter") and fit.types[k] == "number"}
+    rising = {k for k in rising if not (np.diff(fit.numbers(k)) < 0).any()}
+    # To read the cells of wide lines takes long, and a part shows whether times ascend.
+    later = text.spread if texts else text.spread[:: 1 + fit.count // 12] if rising else ()
+    rows = [[cells[k] for k in (*texts, *rising)] for cells in fit.cells_in(later)]
+    for k, cells in zip((*texts, *rising), zip(*rows, strict=True), strict=False):
+        called, others = draft.called(k), {*cells} - {*fit.cells(k)} - {*MISSING}
+        if k in texts and len(others) > KEYS:
+            example = named(sorted(others)[:2])
+            draft.said.append(f"{called} has {len(others)} other values in later lines, as {example}")
+        elif k in rising and (~(np.diff([*map(fit.number, cells)]) >= 0)).sum() > ODD * len(cells):
+            draft.said.append(f"{called}, the {draft.roles[k].role} by the first lines, does not ascend in later ones")
 
 
 def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
@@ -510,8 +519,9 @@ def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
         draft.ask(f"column {old} repeats, and {new} ascends evenly", "time_column", choices, time, other)
 
 
-def _is_total(own: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
-    """Return whether a column is the sum or the mean of others that are side by side; these have shape (lines, n)."""
+def _is_total(values: NDArray[np.float64], at: int) -> bool:
+    """Return whether a column is the sum or the mean of others side by side; all have shape (lines, n)."""
+    own, others = values[:, at], np.delete(values, at, axis=1)
     others = others[:, ~np.isnan(others).all(axis=0)]
     sound = np.isfinite(own) & np.isfinite(others).all(axis=1)
     own, sums = own[sound, None], np.cumsum(np.pad(others[sound], ((0, 0), (1, 0))), axis=1)
