@@ -20,7 +20,7 @@ from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
 from taxel.formats.parts import KEYS
-from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named
+from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named, of_unit
 from taxel.formats.times import ISO, ODD, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, that one counts lines, and what values stay.
@@ -103,17 +103,17 @@ class Draft:
             self.roles[k] = replace(self.roles[k], role=role, why=why, certainty=doubt)
 
     def ask(self, why: str, keys: str, choices: Mapping[str, Changes], *columns: int, first: bool = False) -> None:
-        """Add a question: what is open, the keys that answer it, what each answer changes, and of which columns.
+        """Ask: what is open, the keys that answer it, what each answer changes, and of which columns (`add`)."""
+        self.add(Question(why, frozenset(keys.split()), choices), *columns, first=first)
 
-        The `first` one is printed with its layouts.
-        """
-        question = Question(why, frozenset(keys.split()), choices)
+    def add(self, question: Question, *columns: int, first: bool = False) -> None:
+        """Add a question about columns, unless it is answered; the `first` one is printed with its layouts."""
         if question.keys & self.layout.stated:
             return
         self.questions.insert(0 if first else len(self.questions), question)
         for k in columns:
             self.roles[k].certainty = OPEN
-            self.roles[k].why = self.roles[k].why or why
+            self.roles[k].why = self.roles[k].why or question.why
 
     def answer(self, key: str) -> None:
         """Remove the questions that a key answers, as something else does."""
@@ -270,8 +270,7 @@ def _unit_of_time(draft: Draft, column: int) -> str:
         return stated
     unit, possible = unit_of_times(draft.fit.numbers(column))
     if possible:
-        choices = {f"{each}: {hz:.4g} frames/s": {"time_unit": each} for each, hz in possible.items()}
-        draft.ask("the unit of the time", "time_unit", choices, column)
+        draft.add(of_unit(possible), column)
     return unit
 
 
