@@ -44,8 +44,8 @@ def read(path: Path, layout: Layout | None = None) -> list[InMemory]:
     try:
         import faery  # noqa: PLC0415  an extra
     except ImportError:
-        text = "to read a file of an event camera, taxel needs faery: pip install 'taxel[events]'"
-        raise ImportError(f"{path}: {text}") from None
+        how = "which is not installed: pip install 'taxel[events]'"
+        raise ImportError(f"{path}: to read a file of an event camera, taxel needs faery, {how}") from None
     kind = ENDINGS[path.suffix.lower()]
     if not beginning(path, 1).startswith(b"#" if kind == "aedat" else b"%"):
         raise damaged(path, "file of an event camera", "it begins with no header")
