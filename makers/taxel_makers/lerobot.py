@@ -21,7 +21,7 @@ from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.layout import Data, Layout
 from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
-from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role
+from taxel.formats.roles import FIRST, LIKELY, OF_AXES, OPEN, SURE, Changes, Question, Role
 from taxel.formats.times import in_order
 from taxel.labels import Note, source_of
 from taxel.reading import InMemory, damaged, read_parquet, refused, unreadable, values_in, warn
@@ -164,8 +164,7 @@ def _ask(
         choices = {f"the feature {name}": {"array": name} for name in numbers}
         questions.append(Question("which feature is touch", frozenset({"array"}), choices))
     if layout.axis is None and any(_axes(features[name]) is not None for name in chosen):
-        choices = {f'axis = "{each}"': {"axis": each} for each in ("z", "all", "shear")}
-        questions.append(Question("taxels with the axes x, y and z", frozenset({"axis"}), choices))
+        questions.append(OF_AXES)
     for role in roles:
         role.certainty = OPEN if questions and role.name in (chosen or numbers) else role.certainty
     refuse_open(path, "can be read in", layout, roles, questions)

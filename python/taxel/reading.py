@@ -20,7 +20,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.errors import damaged, refused, unreadable
+from taxel._base.errors import damaged, helped, refused, unreadable
 from taxel._base.messages import warn
 from taxel._base.table_text import Text, beginning, read_parquet, values_in
 from taxel.array import Array
@@ -46,6 +46,7 @@ __all__ = [
     "after_zeros",
     "beginning",
     "damaged",
+    "helped",
     "kind_of_file",
     "read_parquet",
     "refused",

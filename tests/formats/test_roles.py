@@ -13,7 +13,10 @@ from shell import call
 
 import taxel
 from taxel import FormatError, Frames
+from taxel._base.table_text import Text
+from taxel.formats.layout import Layout
 from taxel.formats.roles import Role
+from taxel.formats.table_form import form_of
 
 from .strangers import NAMES, READINGS, lines, rows, written
 from .tables import frames, layouts, opened
@@ -111,6 +114,25 @@ def test_later_lines_that_contradict_the_first_are_said(tmp_path: Path) -> None:
 
     assert " other values in later lines, as 1" in opened(tmp_path, text(5000)).said
     assert "later lines" not in opened(tmp_path, text(9000)).said
+
+
+def test_a_time_a_counter_and_a_total_that_later_lines_contradict_are_said(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+
+    def said(count: int) -> str:
+        def line(k: int) -> str:
+            cells = random.integers(0, 900, 3)
+            time, number, total = (10 * k, k, cells.sum()) if k < count else random.integers(0, 900, 3)
+            return ",".join(map(str, [time, number, *cells, total]))
+
+        (tmp_path / "a.csv").write_text(lines(line, 9000, "t_ms,iter,a,b,c,L"))
+        return "; ".join(form_of(Text(tmp_path / "a.csv"), Layout(tmp_path / "a.csv"))[0].said)
+
+    assert "first lines" not in said(9000)
+    found = said(3000)
+    assert "t_ms, the time by the first lines, does not ascend in later ones" in found
+    assert "iter, the counter by the first lines, does not ascend in later ones" in found
+    assert "L is the sum or mean of others in the first lines alone" in found
 
 
 def test_info_shows_roles_that_are_likely_and_refuses_open_ones(tmp_path: Path, capsys) -> None:

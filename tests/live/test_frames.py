@@ -148,6 +148,47 @@ def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_pat
     assert sorted(kept) == ["5,6", "7", "9,9", "Hello from the mat"]
 
 
+IN_TURN = {
+    "before numbers": ("left: {},2,3\nright: {},800,7\n", ",rate=50"),
+    "by key": ('{{"left": [{}, 2]}}\n{{"right": [{}, 800, 7]}}\n', ",rate=50"),
+    "behind the time": ("{t},left:{},2\n{u},right:{},800\n", ""),
+    "by a column": ("{t},left,{},2\n{u},right,{},800\n", ",by=2"),
+    "a column each line": ("{t},left,{}\n{u},right,{}\n", ",by=2,time=1:ms,unit=N"),
+}
+
+
+@pytest.mark.parametrize("how", IN_TURN)
+def test_two_sensors_that_print_in_turn_are_two_sources(how: str, tmp_path: Path) -> None:
+    line, keys = IN_TURN[how]
+    text = "Ready\n" + "".join(line.format(k % 9, 900 - k, t=20 * k, u=20 * k + 5) for k in range(100))
+    with served(text) as address:
+        with Live(sources=f"lines+tcp:{address}{keys}", record=tmp_path / "a.mcap") as live:
+            assert live.name == "left"
+            until(lambda: live.counters["frames"] == 100 == live.counters["sources"]["right"]["frames"])
+            counters = live.stop().counters
+        assert counters["sources"]["right"]["lines"]["strange"] == 0
+    left, right = taxel.open(tmp_path / "a.mcap").sources.values()
+    assert left.frames().values[:, 0, 0].tolist() == [k % 9 for k in range(100)]
+    assert right.frames().values[:, 0, 0].tolist() == [900 - k for k in range(100)]
+    if "time" in how or "column" in how:
+        assert left.frames().t.tolist() == [20_000 * k for k in range(100)]
+        assert right.frames().t.tolist() == [20_000 * k + 5000 for k in range(100)]
+
+
+def test_of_sensors_that_print_in_turn_each_ends_its_frames_and_lines_of_none_are_counted(tmp_path: Path) -> None:
+    frame = "left: {0} 2\nleft: 3 4\n\nright: 5 {0}\nright: 7 8\n\n"
+    text = "".join(frame.format(k) for k in range(50)) + "middle: 1 2\nleft: 1\n\n"
+    source = "mat=lines+tcp:{},rate=50,array=2x2,frame_end=blank"
+    with served(text) as address, Live(sources=source.format(address), record=tmp_path / "a.mcap") as live:
+        until(lambda: live.counters["sources"]["mat_right"]["frames"] == 50)
+        until(lambda: live.counters["lines"]["strange"] == 1)
+        assert live.stop().counters["lines"]["bytes_in_no_line"] == len("middle: 1 2")
+    sources = taxel.open(tmp_path / "a.mcap").sources
+    assert [*sources] == ["mat_left", "mat_right"]
+    assert sources["mat_left"].frames().values.tolist() == [[[k, 2], [3, 4]] for k in range(50)]
+    assert sources["mat_right"].frames().values.tolist() == [[[5, k], [7, 8]] for k in range(50)]
+
+
 def test_a_layout_file_names_a_source(tmp_path: Path) -> None:
     layout = tmp_path / "mat.layout.toml"
     with served("t,x,a,b\n0,hi,1000,1023\n20,hi,900,1023\n") as address:

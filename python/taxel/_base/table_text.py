@@ -138,7 +138,8 @@ class Text:
         with open(self.path, "rb") as file:
             for place in range(0, max(0, rest), max(1, rest // min(_SPREAD, 1 + _MORE // longest))):
                 file.seek(begin + place)
-                found += file.read(longest).split(b"\n")[1:2]
+                # Those at the ends may be parts.
+                found += file.read(longest).split(b"\n")[1:-1][:1]
         lines = (line.decode(self.encoding, "replace").rstrip("\r") for line in found)
         return [line for line in lines if self._takes is None or self._takes(line)]
 

@@ -19,7 +19,7 @@ from taxel.formats.column_names import AXES, time_unit
 from taxel.formats.layout import Data, Layout, advice
 from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
-from taxel.formats.roles import LIKELY, OPEN, SURE, Changes, Question, Role, named
+from taxel.formats.roles import LIKELY, OF_AXES, OPEN, SURE, Changes, Question, Role, named, of_unit
 from taxel.formats.times import in_order, unit_of_times
 from taxel.reading import InMemory
 
@@ -256,12 +256,9 @@ def _axes(path: Path, layout: Layout, how: Data, group: Group) -> tuple[Layout, 
         questions.insert(0, Question("which axis is the time", frozenset({"axes"}), likely))
     named = stated or with_time_at(axis).split()
     if "axis" in named and shape[named.index("axis")] == len(AXES) and layout.axis is None:
-        choices: dict[str, Changes] = {f'axis = "{each}"': {"axis": each} for each in ("z", "all", "shear")}
-        if len(shape) == 3 and not stated:
-            choices["three columns of taxels"] = {
-                "axes": " ".join(named).replace("taxel", "row").replace("axis", "column")
-            }
-        questions.append(Question("taxels with the axes x, y and z", frozenset({"axis"}), choices))
+        columns: Changes = {"axes": " ".join(named).replace("taxel", "row").replace("axis", "column")}
+        more = {"three columns of taxels": columns} if len(shape) == 3 and not stated else {}
+        questions.append(replace(OF_AXES, choices={**OF_AXES.choices, **more}))
     how = replace(how, axes=" ".join(named))
     certainty = OPEN if questions else SURE if stated else LIKELY
     roles = [
@@ -282,9 +279,8 @@ def _timed(layout: Layout, how: Data, time: str, stored: NDArray[Any], questions
     unit, possible = time_unit(time) or "", dict[str, float]()
     if not unit and "time_unit" not in layout.stated:
         unit, possible = unit_of_times(times)
-    choices: dict[str, Changes] = {f"times in {each}": {"time_unit": each} for each in possible}
-    if choices:
-        questions.append(Question("the unit of the time", frozenset({"time_unit"}), choices))
+    if possible:
+        questions.append(of_unit(possible))
     return replace(how, time=time, time_unit=how.time_unit if "time_unit" in layout.stated else unit)
 
 

@@ -1,35 +1,25 @@
-"""An event camera that looks at a skin from behind: `.raw` (EVT2, EVT3), `.dat` and `.aedat4`, by the library faery.
-
-They are read as events, or, with a window, as frames of counts. No live camera is read.
-"""
+"""What is read of the events of a camera that looks at a skin from behind: a part, or frames of their counts."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 
 import numpy as np
 
 from taxel._base.arguments import finite, integer, shown, text
 from taxel._base.columns import frozen, frozen_whole
-from taxel._base.errors import damaged, helped, refused, unreadable
+from taxel._base.errors import refused
 from taxel._base.limits import check_memory
-from taxel._base.messages import first_line, installing
-from taxel._base.table_text import beginning
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import to_us
 
-#: The endings of these files, and how faery names what is in them.
-ENDINGS: dict[str, str] = {".raw": "evt", ".dat": "dat", ".aedat4": "aedat"}
 POLARITIES = ("both", "on", "off")
 #: The longest window, ms: an hour.
 _LONGEST_MS = 3.6e6
-#: What begins a text in UTF-8 or UTF-16, which no event does.
-_TEXTS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 
 
 @dataclass(frozen=True)
@@ -124,57 +114,6 @@ def _ends(region: str) -> tuple[int, int | None, int, int | None]:
         raise refused("region", f" is {shown(region)}: must be columns A:B and rows C:D, for example 100:420,60:300")
     left, right, top, bottom = (int(end) if end else None for end in found.groups())
     return left or 0, right, top or 0, bottom
-
-
-def knows(path: Path) -> bool:
-    """Return whether a file is of this kind: ``.raw`` and ``.aedat4``, and those ``.dat`` that are not text."""
-    ending = path.suffix.lower()
-    if ending != ".dat" or not path.is_file():
-        return ending in ENDINGS and path.is_file()
-    head = beginning(path)
-    header = re.match(rb"(?:%[^\n]*\n)*", head)
-    below = head[header.end() if header else 0 :][:64]
-    # Of each event's word the upper bytes of its time are 0.
-    return not head.startswith(_TEXTS) and (below[1:2] == b"\x08" or below.count(0) >= 8)
-
-
-def read_events(path: Path, size: Array | None = None) -> Events:
-    """Read the events of a file; `size` is that of a sensor whose header has none.
-
-    Raises
-    ------
-    FormatError : a file that is damaged, has no header or no event, or is larger than the memory that is available
-    ImportError : faery is not installed (``pip install 'taxel[events]'``)
-    """
-    try:
-        import faery  # noqa: PLC0415  an extra
-    except ImportError:
-        text = f"to read a file of an event camera, taxel needs faery, which is not installed: {installing('events')}"
-        raise ImportError(f"{path}: {text}") from None
-    kind = ENDINGS[path.suffix.lower()]
-    if not beginning(path, 1).startswith(b"#" if kind == "aedat" else b"%"):
-        raise damaged(path, "file of an event camera", "it begins with no header")
-    try:
-        # A header without a size has that of no event.
-        given = (0, 0) if size is None else (size.columns, size.rows)
-        stream = faery.events_stream_from_file(path, file_type=kind, dimensions_fallback=given)
-        columns, rows = stream.dimensions()
-        packets = list(stream) if columns and rows else []
-    except (MemoryError, KeyboardInterrupt, FileNotFoundError, PermissionError):
-        raise
-    # At damaged files faery also panics, which is no Exception.
-    except BaseException as error:
-        raise damaged(path, "file of an event camera", first_line(error)) from None
-    if not columns or not rows:
-        raise helped(unreadable("the header does not state the size of the sensor", path), "array", "lay_out_camera")
-    if not packets:
-        raise unreadable("contains no event; the file is damaged, or nothing moved", path)
-    found = np.concatenate(packets)
-    try:
-        array = Array(rows, columns, name="event camera")
-        return Events(found["t"].astype(np.int64), found["x"], found["y"], found["on"], array=array)
-    except ProblemError as error:
-        raise damaged(path, "file of an event camera", first_line(error)) from None
 
 
 def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:

@@ -213,6 +213,8 @@ class PrintedFrames:
         "t:ms", "1+2" ..., or "0", the time of arrival; default: a column that looks like it, else that of arrival.
     columns, leave_out : list of str or int
         The names of the columns; those without values.
+    by : str or int, optional
+        The column that names the sensor of each line, where several print to one place in turn.
     frame_lines : int, 1 or more, optional
         Number of lines of a frame.
     frame_end : {"blank"}, optional
@@ -228,6 +230,7 @@ class PrintedFrames:
     time: str | None = None
     columns: Sequence[str] = ()
     leave_out: Sequence[str | int] = ()
+    by: str | int | None = None
     frame_lines: int | None = None
     frame_end: str | None = None
 
@@ -246,6 +249,7 @@ class PrintedFrames:
         table = Table(
             columns=self.columns,
             leave_out=self.leave_out,
+            by=self.by,
             time_column=0 if time == "0" else time or None,
             time_unit=unit or "s",
             frame_lines=self.frame_lines,

@@ -88,23 +88,28 @@ class Fit:
     def numbers(self, column: int) -> NDArray[np.float64]:
         """Return the numbers of a column; NaN for other cells."""
         if column not in self._numbers:
-            self._numbers[column] = np.array(list(map(self._number, self.cells(column))))
+            self._numbers[column] = np.array(list(map(self.number, self.cells(column))))
         return self._numbers[column]
 
     def wide(self, column: int) -> NDArray[np.float64]:
         """Return the numbers of a column, and of it over the rest of the file; NaN for other cells."""
-        more = [self._number(cells[column]) for cells in self.spread]
+        more = [self.number(cells[column]) for cells in self.spread]
         return np.concatenate([self.numbers(column), np.array(more, np.float64)])
 
-    def _number(self, cell: str) -> float:
+    def number(self, cell: str) -> float:
+        """Return the number that a cell states; NaN if none."""
         marks = self.decimal, self.thousands
         return number_of(cell, *marks) if is_number(cell, *marks) else np.nan
 
     def over(self, lines: Iterable[str]) -> Fit:
-        """Return the same with lines over the rest of the file, those that have as many cells."""
+        """Return the same with lines over the rest of the file."""
+        return replace(self, spread=[*self.cells_in(lines)])
+
+    def cells_in(self, lines: Iterable[str]) -> Iterator[tuple[str, ...]]:
+        """Yield the cells of lines over the rest of the file, those that have as many."""
         read = (read_line(line, self.kind, self.separator, self.decimal) for line in lines)
         whole = (line.in_order(self.own).cells for line in read if line is not None)
-        return replace(self, spread=[cells for cells in whole if len(cells) == self.count])
+        yield from (cells for cells in whole if len(cells) == self.count)
 
     def ascends(self, column: int) -> bool:
         """Return whether a column ascends as times do, of which some may repeat, wrap or be out of order."""

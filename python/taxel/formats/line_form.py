@@ -50,7 +50,8 @@ def form_of_lines(
     draft = _reading_of_lines(lines, stated, size)
     if draft is None:
         return None
-    fit, names, left = draft.fit, draft.names, draft.stated_left
+    fit, names = draft.fit, draft.names
+    left = {*draft.stated_left, *(places_of(names, "by", stated.by) if stated.by else ())}
     times = places_of(names, "time", draft.table.time_column) if draft.table.time_column else ()
     of_line = None if size is None else size // (stated.frame_lines or 1)
     is_whole = fit.count - len({*left, *times}) == of_line and not any(map(time_unit, names))
@@ -72,6 +73,7 @@ def form_of_lines(
         draft.questions.clear()
         draft.be("no taxel", "texts", *(k for k in range(len(names)) if fit.types[k] == "text"))
         draft.be("no taxel", "stated", *left)
+        draft.be("sensor", "stated", *(left - draft.stated_left))
     else:
         find_taxels(draft)
         by_key(draft, time, lambda: lines)
@@ -82,14 +84,15 @@ def form_of_lines(
         unclear.append(f"column {draft.table.taxel_column} names the taxel of each line")
     if unclear:
         raise ProblemError(f"{unclear[0]}: state what it is by time=COLUMN:UNIT, leave_out= or frame_lines=")
-    draft.set(leave_out=[k + 1 for k in draft.left], label_column=None)
+    draft.set(leave_out=[k + 1 for k, role in enumerate(draft.roles) if role.is_left and role.role != "sensor"])
+    draft.set(label_column=None)
     return draft.form(tuple(said_of(draft, time)))
 
 
 def _reading_of_lines(lines: Sequence[str], stated: PrintedFrames, size: int | None) -> Draft | None:
     """Return lines as the form reads them that fits best, with the stated names of columns; None if none fits."""
     if several := sensors_in(lines):
-        right = "a live source is of one; print each to a place of its own"
+        right = "they are split where they come before it is stated what they are: state less of them"
         raise ProblemError(f"lines are of {', '.join(several)} in turn: {right}")
     wanted = stated_count(stated, size)
     found, _ = fits_in(lines, lambda: lines, wanted)
@@ -111,4 +114,4 @@ def stated_count(stated: PrintedFrames, size: int | None) -> int | None:
     if size is None or stated.frame_end is not None:
         return None
     clocks = 0 if stated.time in (None, "0") else 2 if "+" in (stated.time or "") else 1
-    return size // (stated.frame_lines or 1) + clocks + len(stated.leave_out)
+    return size // (stated.frame_lines or 1) + clocks + len(stated.leave_out) + (stated.by is not None)

@@ -9,8 +9,9 @@ import csv
 import json
 import re
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 
 from taxel._base.messages import counted
@@ -89,35 +90,19 @@ class Line:
         return Line(tuple(by_name[name] for name in names), names)
 
 
-@dataclass
-class OddLines:
-    """Count lines that are no frame, by kind, with the number of the first of each kind."""
+def odd_lines(odd: Sequence[tuple[str, int]]) -> list[str]:
+    """Return a text for each kind of lines that are no frame; each line is its kind and its number.
 
-    counts: Counter[str] = field(default_factory=Counter)
-    first: dict[str, int] = field(default_factory=dict)
-
-    def add(self, kind: str, number: int, count: int = 1) -> None:
-        """Add lines of a kind; `number` is that of the first of them."""
-        self.counts[kind] += count
-        self.first.setdefault(kind, number)
-
-    def rename_last(self, kind: str, name: str, number: int) -> None:
-        """Count a line by another kind, if it is the first of its kind."""
-        if self.first.get(kind) == number:
-            del self.counts[kind], self.first[kind]
-            self.add(name, number)
-
-    @property
-    def total(self) -> int:
-        """Number of odd lines."""
-        return self.counts.total()
-
-    def said(self) -> list[str]:
-        """Return a text for each kind."""
-        return [
-            f"{counted(count, 'line')} {kind} ({'line' if count == 1 else 'first: line'} {self.first[kind]})"
-            for kind, count in self.counts.items()
-        ]
+    Examples
+    --------
+    >>> odd_lines([("of text", 3), ("of text", 7)])
+    ['2 lines of text (first: line 3)']
+    """
+    first, counts = dict(reversed(odd)), Counter(kind for kind, _ in odd)
+    return [
+        f"{counted(count, 'line')} {kind} ({'line' if count == 1 else 'first: line'} {first[kind]})"
+        for kind, count in counts.items()
+    ]
 
 
 def is_number(cell: str, decimal: str = ".", thousands: str | None = None) -> bool:

@@ -13,6 +13,8 @@ from taxel.formats.lines import has_marks, read_line
 
 #: So many lines say whether they name their sensor; each sensor has at least this share of them.
 _LINES, _SHARE = 200, 0.2
+#: So many different texts are names of sensors, not remarks.
+KEYS = 16
 
 
 def parts_of(text: Text, how: Table | None) -> tuple[dict[str, Text], list[str]]:
@@ -48,7 +50,7 @@ def sensors_in(first: Sequence[str]) -> dict[str, frozenset[str]]:
     lines = [line for line in first[:_LINES] if line.strip()]
     if 2 * sum(map(has_marks, lines[:20])) < len(lines[:20]) or not lines:
         return {}
-    counts = Counter(map(_names, lines))
+    counts = Counter(map(names_of, lines))
     usual = [names for names, count in counts.items() if names and count >= max(2, _SHARE * len(lines))]
     common = frozenset.intersection(*usual) if usual else frozenset[str]()
     own = [names - common for names in usual]
@@ -58,11 +60,11 @@ def sensors_in(first: Sequence[str]) -> dict[str, frozenset[str]]:
 
 def sensor_of(line: str, sensors: dict[str, frozenset[str]]) -> str:
     """Return the sensor that a line names; "" if none."""
-    names = _names(line)
+    names = names_of(line)
     return next((name for name, own in sensors.items() if own <= names), "")
 
 
-def _names(line: str) -> frozenset[str]:
+def names_of(line: str) -> frozenset[str]:
     """Return the names in a line of JSON, or before its numbers, without the places in lists."""
     found = read_line(line, "json" if line.lstrip()[:1] == "{" else "marked")
     names = found.names if found is not None else ()

@@ -72,6 +72,24 @@ class Question:
     choices: Mapping[str, Changes] = field(default_factory=dict)
 
 
+#: What is asked of taxels with three axes.
+OF_AXES = Question(
+    "taxels with the axes x, y and z",
+    frozenset({"axis"}),
+    {
+        'axis = "z"; or "x", "y"': {"axis": "z"},
+        'axis = "all": each axis a source': {"axis": "all"},
+        'axis = "shear": the length of x and y': {"axis": "shear"},
+    },
+)
+
+
+def of_unit(rates: Mapping[str, float]) -> Question:
+    """Return the question which unit times have, by the rate of frames, Hz, in each."""
+    choices = {f"{unit}: {hz:.4g} frames/s": {"time_unit": unit} for unit, hz in rates.items()}
+    return Question("the unit of the time", frozenset({"time_unit"}), choices)
+
+
 class OpenRolesError(FormatError):
     """A file cannot be read before questions are answered.
 

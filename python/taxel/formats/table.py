@@ -26,7 +26,7 @@ from taxel.formats.checks import around
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout
-from taxel.formats.lines import MISSING, OTHER, USUAL, WITH_TEXT, WITH_THOUSANDS, OddLines, is_number, read_line
+from taxel.formats.lines import MISSING, OTHER, USUAL, WITH_TEXT, WITH_THOUSANDS, is_number, odd_lines, read_line
 from taxel.formats.opened import readers_of, sources_of
 from taxel.formats.parts import parts_of
 from taxel.formats.table_columns import EVENT_COLUMNS
@@ -40,6 +40,8 @@ ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
 _CELLS = 1 << 21
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
+#: Kinds of odd lines: with a reading that is missing, and with too few cells, as the last line where a text is cut off.
+MISSING_ONE, TOO_FEW, CUT_OFF = f"{WITH_TEXT}, which is missing", "with too few cells", "cut off at the end"
 #: Lines of events are swapped by at most so much, us.
 _SWAPPED_US = 1_000_000
 #: The least and the largest value of the columns of events.
@@ -58,7 +60,8 @@ class Rows:
     numbers: list[int] = field(default_factory=list)
     begins: list[int] = field(default_factory=list)
     frame_times: list[float] = field(default_factory=list)
-    odd: OddLines = field(default_factory=OddLines)
+    #: The lines that are no frame, each its kind and its number.
+    odd: list[tuple[str, int]] = field(default_factory=list)
 
     @classmethod
     def none(cls, width: int) -> Rows:
@@ -128,8 +131,8 @@ def _read_part(
     rows = read_rows(text, form)
     read = {*columns.times, columns.label, columns.by, *columns.taxel, *columns.taxels}
     left = [form.called(k) for k in range(len(form.names)) if k not in read]
-    lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said(), *more]
-    said, notes = [*form.said, *rows.odd.said(), *more], dict[str, list[Note]]()
+    lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *odd_lines(rows.odd), *more]
+    said, notes = [*form.said, *odd_lines(rows.odd), *more], dict[str, list[Note]]()
     if how.events:
         sources = {part: _events(path, full, form, rows, array, said)}
         shape = sources[part].array.shape
@@ -297,7 +300,7 @@ def _line_by_line(text: Text, form: Form) -> Rows:
     are_texts = {name: not name.startswith(("time", "nano")) or how.time_unit == ISO for name in beside}
     rows, values = Rows.none(len(taxels)), array("f")
     cells: dict[str, list[Any]] = {name: [] for name in beside}
-    waiting, last, number = True, 0, 0
+    waiting, number = True, 0
     for number, line in enumerate(text.lines(), 1):
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
         if number <= form.first and not is_begin:
@@ -316,8 +319,7 @@ def _line_by_line(text: Text, form: Form) -> Rows:
             right = f"write thousands = {OTHER[how.decimal]!r} in [table] of the layout, as lines above show none"
             raise unreadable(f"a number has thousands; {right}", text.path, line=number)
         if odd:
-            rows.odd.add(f"{odd}, which is missing" if read else odd, number)
-            last = number
+            rows.odd.append((MISSING_ONE if read else odd, number))
         if not read:
             continue
         values.extend([read[k] for k in taxels] if len(taxels) < len(read) else read)
@@ -325,15 +327,15 @@ def _line_by_line(text: Text, form: Form) -> Rows:
         own = form.cells(line)[0] if any(are_texts.values()) else []
         for name, k in beside.items():
             cells[name].append(own[k] if are_texts[name] else read[k])
-    if last and last == number and not text.ends_in_line:
-        rows.odd.rename_last("with too few cells", "cut off at the end", last)
-    kinds = "; ".join(rows.odd.said())
+    if rows.odd[-1:] == [(TOO_FEW, number)] and not text.ends_in_line:
+        rows.odd[-1] = (CUT_OFF, number)
+    kinds = "; ".join(odd_lines(rows.odd))
     if not rows.numbers:
         raise unreadable(f"contains no line of numbers{': ' * bool(kinds)}{kinds}", text.path)
-    total = len(rows.numbers) + rows.odd.total - rows.odd.counts[f"{WITH_TEXT}, which is missing"]
-    if rows.odd.total > max(FEW_ODD, ODD * total) or rows.odd.total >= len(rows.numbers):
-        first = min(rows.odd.first.values())
-        raise unreadable(f"{rows.odd.total} of {total} lines are no frames: {kinds}", text.path, line=first)
+    count = len(rows.odd)
+    total = len(rows.numbers) + sum(kind != MISSING_ONE for kind, _ in rows.odd)
+    if count > max(FEW_ODD, ODD * total) or count >= len(rows.numbers):
+        raise unreadable(f"{count} of {total} lines are no frames: {kinds}", text.path, line=rows.odd[0][1])
     rows.values = np.array(values, np.float32).reshape(-1, len(taxels))
     rows.beside = pd.DataFrame(cells, index=range(len(rows.numbers)))
     return rows.joined()
@@ -348,9 +350,8 @@ def _frames_of_lines(path: Path, layout: Layout, form: Form, rows: Rows, said: l
     if how.frame_lines is not None:
         lines, begins = how.frame_lines, np.arange(0, count, how.frame_lines)
         within = next((row for row in rows.begins if row % lines and row < count), None)
-        odd = rows.odd.counts.total() - rows.odd.counts["of text"] - rows.odd.counts["cut off at the end"]
-        if within is not None or odd:
-            number = min(rows.odd.first.values()) if within is None else rows.numbers[within]
+        if within is not None or any(kind not in ("of text", CUT_OFF) for kind, _ in rows.odd):
+            number = rows.odd[0][1] if within is None else rows.numbers[within]
             raise unreadable(f"an empty or odd line is within a frame of {lines} lines", path, line=number)
         sizes = np.diff([*begins, count])
     else:

@@ -19,13 +19,14 @@ from taxel.formats.form import Form, left_out, places_of
 from taxel.formats.layout import Layout, Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
-from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named
-from taxel.formats.times import ISO, unit_of_times
+from taxel.formats.parts import KEYS
+from taxel.formats.roles import FIRST, LIKELY, OPEN, SURE, Changes, Question, Role, named, of_unit
+from taxel.formats.times import ISO, ODD, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, that one counts lines, and what values stay.
 _ASCENDS, _COUNTS, _STAYS = 8, 20, 40
-#: So many different texts are names of sensors, not remarks; so many whole values are those of labels.
-_KEYS, _LABELS = 16, 5
+#: So many whole values are those of labels.
+_LABELS = 5
 #: Of so many columns each block is tried as the parts of a total; of more those that begin at the first.
 _BLOCKS = 64
 #: So many columns with names that differ in a number are a series.
@@ -102,17 +103,17 @@ class Draft:
             self.roles[k] = replace(self.roles[k], role=role, why=why, certainty=doubt)
 
     def ask(self, why: str, keys: str, choices: Mapping[str, Changes], *columns: int, first: bool = False) -> None:
-        """Add a question: what is open, the keys that answer it, what each answer changes, and of which columns.
+        """Ask: what is open, the keys that answer it, what each answer changes, and of which columns (`add`)."""
+        self.add(Question(why, frozenset(keys.split()), choices), *columns, first=first)
 
-        The `first` one is printed with its layouts.
-        """
-        question = Question(why, frozenset(keys.split()), choices)
+    def add(self, question: Question, *columns: int, first: bool = False) -> None:
+        """Add a question about columns, unless it is answered; the `first` one is printed with its layouts."""
         if question.keys & self.layout.stated:
             return
         self.questions.insert(0 if first else len(self.questions), question)
         for k in columns:
             self.roles[k].certainty = OPEN
-            self.roles[k].why = self.roles[k].why or why
+            self.roles[k].why = self.roles[k].why or question.why
 
     def answer(self, key: str) -> None:
         """Remove the questions that a key answers, as something else does."""
@@ -269,8 +270,7 @@ def _unit_of_time(draft: Draft, column: int) -> str:
         return stated
     unit, possible = unit_of_times(draft.fit.numbers(column))
     if possible:
-        choices = {f"{each}: {hz:.4g} frames/s": {"time_unit": each} for each, hz in possible.items()}
-        draft.ask("the unit of the time", "time_unit", choices, column)
+        draft.add(of_unit(possible), column)
     return unit
 
 
@@ -305,7 +305,7 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[tuple[str, str]]
     """Yield what a column is that is no taxel, and why, by its cells or its name; the first with a reason counts."""
     fit, name = draft.fit, draft.names[column]
     kind, cells = fit.types[column], [cell for cell in fit.cells(column) if cell not in MISSING]
-    few, reads = len(set(cells)) <= _KEYS, f"; label_column = {draft.called(column)!r} reads them"
+    few, reads = len(set(cells)) <= KEYS, f"; label_column = {draft.called(column)!r} reads them"
     of_time = time_unit(name) is not None and len(name) > 1
     if kind == "day":
         yield "no taxel", "a date"
@@ -456,11 +456,12 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
         at, steps = taxels.index(k), np.diff(fit.numbers(k))
         numbers = whole[:, at]
         values, few = set(numbers[np.isfinite(numbers)].tolist()), len(steps) < _COUNTS
+        is_total = not few and _is_total(whole, at)
         if not few and time is not None and _rises(fit, k) and _is_even(fit.numbers(k)):
             _ask_of_two_times(draft, time, k)
         elif not few and (steps == 1).mean() >= 0.95:
             draft.be("counter", "counts up by one", k)
-        elif not few and _is_total(numbers, np.delete(whole, at, axis=1)):
+        elif is_total:
             draft.be("total", "the sum or mean of others", k)
         elif not few and len(values) == 1:
             draft.be("taxel", f"always {fit.cells(k)[0]}", k)
@@ -475,6 +476,8 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
         elif draft.names[k] and len(series) >= _SERIES:
             draft.be("taxel", "named otherwise than the others", k, certainty=OPEN)
             strays.append(k)
+        if fit.spread and not (few or is_total) and _is_total(whole[: len(fit.body)], at):
+            draft.said.append(f"{draft.called(k)} is the sum or mean of others in the first lines alone")
     if asked := [*labels, *strays]:
         called, out = [draft.called(k) for k in labels], [draft.called(k) for k in strays]
         choices: dict[str, Changes] = {f"leave out {named([*map(str, [*called, *out])])}": {"left": out}}
@@ -486,15 +489,21 @@ def by_values(draft: Draft, time: int | None, text: Text) -> None:
 
 
 def say_contradictions(draft: Draft, text: Text) -> None:
-    """Say which columns that hold labels or a key by the first lines have many other values later."""
-    few = [k for k, role in enumerate(draft.roles) if role.role in ("label", "sensor") and role.certainty == LIKELY]
-    fit = draft.fit.over(text.spread) if few else draft.fit
-    for k in few:
-        later = {cells[k] for cells in fit.spread} - {*fit.cells(k)} - {*MISSING}
-        if len(later) > _KEYS:
-            draft.said.append(
-                f"{draft.called(k)} has {len(later)} other values in later lines, as {named(sorted(later)[:2])}"
-            )
+    """Say which columns hold in later lines what contradicts their role by the first: labels, keys, times, counters."""
+    fit = draft.fit
+    texts = {k for k, role in enumerate(draft.roles) if role.role in ("label", "sensor") and role.certainty == LIKELY}
+    rising = {k for k, role in enumerate(draft.roles) if role.role in ("time", "counter") and fit.types[k] == "number"}
+    rising = {k for k in rising if not (np.diff(fit.numbers(k)) < 0).any()}
+    # To read the cells of wide lines takes long, and a part shows whether times ascend.
+    later = text.spread if texts else text.spread[:: 1 + fit.count // 12] if rising else ()
+    rows = [[cells[k] for k in (*texts, *rising)] for cells in fit.cells_in(later)]
+    for k, cells in zip((*texts, *rising), zip(*rows, strict=True), strict=False):
+        called, others = draft.called(k), {*cells} - {*fit.cells(k)} - {*MISSING}
+        if k in texts and len(others) > KEYS:
+            example = named(sorted(others)[:2])
+            draft.said.append(f"{called} has {len(others)} other values in later lines, as {example}")
+        elif k in rising and (~(np.diff([*map(fit.number, cells)]) >= 0)).sum() > ODD * len(cells):
+            draft.said.append(f"{called}, the {draft.roles[k].role} by the first lines, does not ascend in later ones")
 
 
 def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
@@ -509,8 +518,9 @@ def _ask_of_two_times(draft: Draft, time: int, other: int) -> None:
         draft.ask(f"column {old} repeats, and {new} ascends evenly", "time_column", choices, time, other)
 
 
-def _is_total(own: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
-    """Return whether a column is the sum or the mean of others that are side by side; these have shape (lines, n)."""
+def _is_total(values: NDArray[np.float64], at: int) -> bool:
+    """Return whether a column is the sum or the mean of others side by side; all have shape (lines, n)."""
+    own, others = values[:, at], np.delete(values, at, axis=1)
     others = others[:, ~np.isnan(others).all(axis=0)]
     sound = np.isfinite(own) & np.isfinite(others).all(axis=1)
     own, sums = own[sound, None], np.cumsum(np.pad(others[sound], ((0, 0), (1, 0))), axis=1)

@@ -23,7 +23,7 @@ from taxel.formats.layout import Layout, Table
 from taxel.formats.layout_text import refuse_open
 from taxel.formats.line_fits import FITS, THOUSAND, Fit, fits_in
 from taxel.formats.lines import OTHER, is_number, number_of, read_line
-from taxel.formats.roles import SURE, Changes
+from taxel.formats.roles import OF_AXES, SURE, Changes
 from taxel.formats.table_columns import (
     Draft,
     are_events,
@@ -426,13 +426,7 @@ def _with_size(layout: Layout, draft: Draft) -> Layout:
     full = replace(layout, unit=layout.unit or unit or None)
     names = [draft.names[k] for k in taxels]
     if any(names) and column_names.axes_of(names) is not None:
-        if layout.axis is None:
-            choices: dict[str, Changes] = {
-                'axis = "z"; or "x", "y"': {"axis": "z"},
-                'axis = "all": each axis a source': {"axis": "all"},
-                'axis = "shear": the length of x and y': {"axis": "shear"},
-            }
-            draft.ask("taxels with the axes x, y and z", "axis", choices, *taxels)
+        draft.add(OF_AXES, *taxels)
         return full
     places = draft.size or (column_names.places_of(names) if any(names) and not layout.rows else None)
     if places is not None and min(places) > 1:

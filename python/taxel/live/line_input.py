@@ -49,6 +49,7 @@ class LineInput:
         self.is_serial = self._kind == "serial"
         #: The bytes that are in no line.
         self.lines = TextLines(LONGEST)
+        self.discard, self.take_left_out = self.lines.discard, self.lines.take_left_out
         #: Whether the next line may lack its beginning: whatever sends may have begun before. A file is read from its
         #: beginning, and a datagram begins with a line.
         self._may_be_cut = not self.is_file and self._kind != "udp"

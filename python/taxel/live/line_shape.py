@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.form import Form
 from taxel.formats.line_form import form_of_lines, stated_count
+from taxel.formats.parts import KEYS, names_of, sensor_of, sensors_in
 from taxel.formats.times import FOUND_US, ISO, UNITS_US
 from taxel.live.line_frames import LineFrames, array_of, row_of
 from taxel.live.stated_source import StatedSource
@@ -208,6 +209,24 @@ class LineShape:
             return form_of_lines(texts, self._stated.printed, size, unit_of, are_taxels=not self._is_row)
         except (ProblemError, FormatError) as error:
             raise self._refused(f": {first_line(error)}") from None
+
+    def sensors_of(self, texts: Sequence[str]) -> tuple[list[str], Callable[[str], str]] | None:
+        """Return the sensors that lines name in turn, and a function of a line that returns its sensor; None of one.
+
+        They are named by the column that is stated as `by`, or by the names before numbers.
+        """
+        if self._stated.printed.by is None:
+            named = sensors_in(texts)
+            return ([*named], lambda text: sensor_of(text, named) or " ".join(names_of(text))) if named else None
+        form = self.form_of(texts, None)
+        if form is None or (k := form.columns.by) is None:
+            return None
+
+        def key_of(text: str) -> str:
+            cells = form.cells(text)[0]
+            return cells[k] if len(cells) == len(form.names) else ""
+
+        return [*dict.fromkeys(filter(None, map(key_of, texts)))][:KEYS], key_of
 
     def layout(self, readout_unit: str | None) -> dict[str, Any]:
         """Return what a frame is, as the compiled part knows it from now on."""

@@ -14,8 +14,10 @@ from taxel._base.text_lines import ArrivedLine
 from taxel._core import Error, ProblemError, now_ns
 from taxel.array import Array
 from taxel.formats.lines import is_number
+from taxel.labels import source_of
 from taxel.live.line_frames import LineFrames
 from taxel.live.line_input import LineInput
+from taxel.live.line_parts import PartOfInput, parts_of_input
 from taxel.live.line_shape import LineShape, numbers_of, texts_of
 from taxel.live.stated_source import StatedSource
 
@@ -39,6 +41,13 @@ class Lines:
         not stated to be a sensor.
     readout : Array, optional
         The sensor of the readout.
+    part : PartOfInput, optional
+        What reads the lines of one sensor, where several print to one place in turn.
+
+    Attributes
+    ----------
+    others : list of Lines
+        Those of the further sensors that print to its place, once they are found.
 
     Raises
     ------
@@ -46,10 +55,19 @@ class Lines:
     ProblemError : it is not a place of lines
     """
 
-    def __init__(self, stated: StatedSource, *, is_read_out: bool, readout: Array | None = None) -> None:
-        self.stated, self.name = stated, stated.called
-        self._input = None
-        if stated.kind == "lines":
+    def __init__(
+        self,
+        stated: StatedSource,
+        *,
+        is_read_out: bool,
+        readout: Array | None = None,
+        part: PartOfInput | None = None,
+    ) -> None:
+        self.stated, self.name, self.others = stated, stated.called, list[Lines]()
+        self._input: LineInput | PartOfInput | None = part
+        if part is not None:
+            self._take(part)
+        elif stated.kind == "lines":
             baud = stated.printed.baud
             self._input = LineInput(stated.place if baud is None else f"{stated.place},baud={baud}")
         self.place = "a program" if self._input is None else self._input.place
@@ -79,6 +97,21 @@ class Lines:
         self.failed: Error | OSError | None = None
         self._given = threading.Lock()
 
+    def _take(self, part: PartOfInput) -> None:
+        """Read the lines of one sensor alone, by whose name it is called."""
+        self._input, self.name = part, source_of(" ".join(filter(None, (self.stated.name, part.name))))
+
+    def _split(self) -> None:
+        """Let lines that name their sensor in turn be of several sources, of which this is the first."""
+        texts = [line.text for line in texts_of(self._waiting)]
+        if not isinstance(self._input, LineInput) or not (found := self.shape.sensors_of(texts)):
+            return
+        names, sensor_of = found
+        first, *others = parts_of_input(self._input, names, sensor_of, self._waiting)
+        self._take(first)
+        self.others = [Lines(self.stated, is_read_out=True, part=part) for part in others]
+        self._waiting = first.read()
+
     def find(self, most_s: float) -> None:
         """Find out how the lines are read. What is stated whole need not have sent anything.
 
@@ -107,6 +140,8 @@ class Lines:
             first = now if first is None and texts_of(self._waiting) else first
             since = 0.0 if first is None else now - first
             enough = len(numbers_of(self._waiting)) >= _LINES or since >= _MEASURE_S or self._has_ended
+            if enough:
+                self._split()
             if first is not None and (enough or is_stated) and self._understood(final=False):
                 return
             if is_stated and (first is None or not numbers_of(self._waiting)):
@@ -114,7 +149,7 @@ class Lines:
                 return
             if first is None and (self._has_ended or now - begun >= most_s):
                 within = "before the end" if self._has_ended else f"within {now - begun:.0f} s"
-                self._input.lines.discard()
+                self._input.discard()
                 self._leave_out()
                 size = sum(self._left_out) + sum(line.size for line in self._waiting)
                 came = f"{counted(size, 'byte')} arrived {within}, but no line of text that ends"
@@ -150,7 +185,7 @@ class Lines:
                         break
                     self._read()
                 if not self._goes_on:
-                    input_.lines.discard()
+                    input_.discard()
                     self._leave_out()
                 self._pass()
                 # What follows is no silence.
@@ -232,7 +267,7 @@ class Lines:
     def _leave_out(self) -> None:
         """Count the bytes that are in no line."""
         assert self._input is not None
-        in_no_line, unfinished = self._input.lines.take_left_out()
+        in_no_line, unfinished = self._input.take_left_out()
         self._left_out = [self._left_out[0] + in_no_line, self._left_out[1] + unfinished]
 
     def _leave_out_cut(self, frames: LineFrames) -> None:

@@ -54,7 +54,7 @@ class Sources:
                     "another NAME="
                 )
         self.lines: list[Lines] = []
-        self._kept = {lines.stated.text: lines for lines in kept if lines.is_open}
+        self._kept = {lines.stated.text: lines for lines in reversed(kept) if lines.is_open}
         self._inlets: dict[str, LslInlet] = {}
         self._unit = getattr(options.readout, "unit", None)
         self._readout = options.array
@@ -65,7 +65,8 @@ class Sources:
                 boards = [k for k, source in enumerate(stated) if source.kind == "board"]
                 options = self._read_out(stated.pop(boards[0] if boards else 0), options)
             self.options = options
-            self._others = [self._other(source) for source in stated]
+            self._others = [] if self._read is None else [each.source(self._unit) for each in self._read.others]
+            self._others += [each for source in stated for each in self._other(source)]
 
     @contextlib.contextmanager
     def abandoned_on_error(self) -> Iterator[None]:
@@ -92,28 +93,35 @@ class Sources:
                 f"source {source.text!r}: contains no frames, so it cannot be shown or read by a readout"
             )
         self._read = self._opened(source, options, is_read_out=True)
-        return replace(options, array=self._read.shape.array, name=source.called)
+        return replace(options, array=self._read.shape.array, name=self._read.name)
 
-    def _other(self, source: StatedSource) -> dict[str, Any]:
-        """Return a further source as the compiled part knows it."""
+    def _other(self, source: StatedSource) -> list[dict[str, Any]]:
+        """Return a further source as the compiled part knows it, or several that print to one place."""
         if source.kind == "board":
             array = source.array or Array.thesis()
             registers = json.loads(source.registers(array)._json())
             board = {"address": source.place, "array": array._geometry(), "registers": registers}
-            return {"name": source.called, "place": f"udp {source.place}", "kind": {"board": board}}
+            return [{"name": source.called, "place": f"udp {source.place}", "kind": {"board": board}}]
         if source.kind == "lsl":
             inlet = self._inlets[source.called] = LslInlet(source.place)
             source = StatedSource.of(f"{source.called}=given,columns={':'.join(inlet.columns)}")
-        return self._opened(source, self.options, is_read_out=False).source(self._unit)
+        lines = self._opened(source, self.options, is_read_out=False)
+        return [each.source(self._unit) for each in (lines, *lines.others)]
 
     def _opened(self, source: StatedSource, options: LiveOptions, *, is_read_out: bool) -> Lines:
         if (kept := self._kept.get(source.text)) is not None:
-            kept.renew()
-            self.lines.append(kept)
+            for each in (kept, *kept.others):
+                each.renew()
+                self.lines.append(each)
             return kept
         lines = Lines(source, is_read_out=is_read_out, readout=self._readout)
         self.lines.append(lines)
         lines.find(options.first_line_s)
+        for other in lines.others:
+            self.lines.append(other)
+            other.find(options.first_line_s)
+        if len({each.name for each in self.lines}) < len(self.lines):
+            raise ProblemError(f"source {source.text!r}: another has lines of {lines.name} too; begin it with NAME=")
         return lines
 
     def for_rust(self, send: Sequence[str]) -> str:

@@ -24,7 +24,7 @@ _FORMS = (
 )
 _LINES = ("serial", "lines", "lines+tcp", "lines+udp")
 _OF_BOARD = ("array", "preset")
-_OF_LINES = ("array", "baud", "time", "columns", "leave_out", "frame_lines", "frame_end", "unit", "falls", "rate")
+_OF_LINES = ("array", "baud", "time", "columns", "leave_out", "by", "frame_lines", "frame_end", "unit", "falls", "rate")
 
 
 @dataclass(frozen=True)
@@ -134,6 +134,7 @@ class StatedSource:
             time=keys.get("time"),
             columns=columns,
             leave_out=keys["leave_out"].split(":") if "leave_out" in keys else (),
+            by=keys.get("by"),
             frame_lines=_whole("frame_lines", keys.get("frame_lines")),
             frame_end=keys.get("frame_end"),
         )
@@ -171,10 +172,11 @@ def with_layout(source: str, form: Form, layout: Layout) -> str:
         )
     array = layout.grid() or (array_of(form, None, None, "")[0] if form.lines > 1 else None)
     times = "+".join(str(k + 1) for k in columns.times)
-    left = (k for k in range(len(form.names)) if k not in {*columns.times, *columns.taxels})
+    left = (k for k in range(len(form.names)) if k not in {*columns.times, *columns.taxels, columns.by})
     keys = {
         "time": f"{times}:{table.time_unit}".removesuffix(":s" * (len(columns.times) > 1)) if times else "0",
         "leave_out": ":".join(str(k + 1) for k in left),
+        "by": None if columns.by is None else columns.by + 1,
         "frame_lines": table.frame_lines,
         "frame_end": table.frame_end,
         "array": None if array is None else f"{array.rows}x{array.columns}",

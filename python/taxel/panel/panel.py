@@ -22,7 +22,6 @@ from taxel.panel.shown_files import Opening
 from taxel.recording import Recording
 from taxel.recording.frames import period_us
 from taxel.recording.kinds import check_recording, is_folder, recordings_in
-from taxel.recording.reading_options import layout_for
 
 
 class Panel:
@@ -167,7 +166,7 @@ def _folder_and_name(path: Path, options: FullReading) -> tuple[Path, str]:
         raise FileNotFoundError(2, "no such recording", str(path))
     # The page asks for what is open.
     with contextlib.suppress(OpenRolesError):
-        check_recording(path, layout_for(path, options.layout, options.rate_hz))
+        check_recording(path, options.layout)
     # A link is a recording of the folder in which it is, as elsewhere: its labels are beside it.
     path = named(path)
     path = path.parent.resolve() / path.name

@@ -27,7 +27,6 @@ from taxel.recording.analysis.rest import loaded_from, of_frames
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.kinds import is_recording, layout_of, takes_layout
-from taxel.recording.reading_options import layout_for
 from taxel.verdict import Verdict
 from taxel.wire import Registers
 
@@ -122,7 +121,7 @@ class Opening:
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""
         options = self.options_of(file)
-        return is_recording(file, layout_for(file, options.layout, options.rate_hz))
+        return is_recording(file, options.layout)
 
     def options_of(self, file: Path) -> FullReading:
         """Return the options by which a file is opened."""
@@ -131,7 +130,7 @@ class Opening:
     def layout_of(self, file: Path) -> Layout:
         """Return the layout by which a file is opened; an empty one if it has none."""
         options = self.options_of(file)
-        given = layout_for(file, options.layout, options.rate_hz)
+        given = options.layout
         return layout_of(file, given) or Layout(file.with_name(layout_name(file)))
 
     def unit_us(self, table: Path) -> float:

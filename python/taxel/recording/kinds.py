@@ -20,9 +20,7 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import event_camera
 from taxel.formats.array_file import look, read_array_file
-from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
 from taxel.formats.foreign import refuse_container
 from taxel.formats.layout import Layout, Table, advice
@@ -31,7 +29,7 @@ from taxel.formats.ros import is_bag, read_ros
 from taxel.formats.table import ENDINGS as TABLES
 from taxel.formats.table import read_table
 from taxel.formats.table_form import form_of
-from taxel.reading import ENDINGS, Facts, InMemory, Reader
+from taxel.reading import ENDINGS, InMemory, Reader
 from taxel.recording.beside import LABELS, is_label_table
 from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
 from taxel.recording.readers.csv import check_head, is_of_taxel, read_csv
@@ -70,12 +68,14 @@ class OpenOptions:
         """Selection of the events of a camera."""
         return Reduction(self.region, self.bin, self.count_ms, self.polarity)
 
-    def with_labels(self, path: Path, layout: Layout | None) -> Layout | None:
-        """Return what a layout says with the column of labels."""
-        if self.label_column is None:
-            return layout
+    def in_layout(self, path: Path, layout: Layout | None, *, has_size: bool) -> Layout | None:
+        """Return what a layout says with the column of labels, and the size of a sensor that the file may lack."""
         full = layout or Layout(path)
-        return replace(full, table=replace(full.table or Table(), label_column=self.label_column))
+        if self.label_column is not None:
+            full = replace(full, table=replace(full.table or Table(), label_column=self.label_column))
+        if has_size and isinstance(self.array, Array):
+            full = replace(full, rows=self.array.rows, columns=self.array.columns, places=None)
+        return layout if full == Layout(path) else full
 
     def check(self, path: Path, kind: str, *, has_labels: bool) -> None:
         """Refuse what is only for files of another kind.
@@ -105,11 +105,14 @@ class Kind:
         Returns a reader of each source; readers of one name are the sources of one recording.
     has_labels : bool, optional
         Whether it has columns of labels, of which one is the label_column in the [table] of the layout.
+    has_size : bool, optional
+        Whether a file may lack the size of its sensor, which the layout then has.
     """
 
     knows: Callable[[Path], bool]
     read: Callable[[Path, Layout | None], Sequence[Reader]]
     has_labels: bool = False
+    has_size: bool = False
 
 
 def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
@@ -127,11 +130,6 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     def read_rows(path: Path, layout: Layout | None) -> Sequence[Reader]:
         readers = read_table(path, layout or Layout(path), array)
         return [_on_given(each, array) for each in readers]
-
-    def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        size = layout.grid() if array is None and layout is not None else array
-        table = event_camera.read_events(path, size)
-        return [InMemory(Facts(path=path, array=table.array, kind="event_camera"), table)]
 
     def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:
         grid = layout.grid() if how.array is None and layout is not None else how.array
@@ -158,7 +156,6 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     }.items()
     yield from _from_elsewhere().items()
     yield from {
-        "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
         "table": Kind(_is_table, read_rows, has_labels=True),
         "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
@@ -361,9 +358,10 @@ def unknown(path: Path) -> FormatError:
     if not head:
         return _empty(path)
     describes = advice(path, "describe a table or an array of another program")
-    known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
     begins = " ".join(f"{byte:02X}" for byte in head)
-    return FormatError(f"{path}, byte 0: starts with {begins}: not a recording; taxel reads {known}; {describes}")
+    return FormatError(
+        f"{path}, byte 0: starts with {begins}: not a recording; taxel reads {', '.join(ENDINGS)}; {describes}"
+    )
 
 
 def refuse_empty(path: Path, kind: str) -> None:

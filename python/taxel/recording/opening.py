@@ -198,7 +198,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     options.check(path, kind, has_labels=getattr(found, "has_labels", False))
     before = path.stat()
     try:
-        readers = found.read(path, options.with_labels(path, layout))
+        readers = found.read(path, options.in_layout(path, layout, has_size=getattr(found, "has_size", False)))
     except MemoryError:
         raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
     after = path.stat()

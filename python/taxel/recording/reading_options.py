@@ -10,8 +10,7 @@ from typing import Any
 from taxel._base.arguments import checked_path, several, text
 from taxel._base.errors import refused
 from taxel.array import Array, of_size
-from taxel.formats.layout import Layout, layout_name
-from taxel.recording.kinds import GivenLayout, files_in, is_folder, kind_of
+from taxel.formats.layout import Layout
 from taxel.recording.opening import open_all
 from taxel.recording.recording import Recording
 from taxel.recording.stated import is_row_of, on_array
@@ -46,23 +45,9 @@ def open_trials(
     sizes = [] if array is None else several("array", array)
     arrays = [of_size(text("array", size), of_wire=False) for size in sizes]
     given = arrays if len(arrays) > 1 else arrays[0] if arrays else None
-    # A layout in memory is no option of `taxel.open`, which is called by its fields.
-    opened = open_all(file, array=given, layout=layout_for(file, layout, rate_hz), **options)  # type: ignore[arg-type]
+    opened = open_all(file, array=given, layout=layout, **options)
     placed = (_on_array(recording, sizes) for recording in opened)
     return [recording if rate_hz is None else recording.at_rate(rate_hz) for recording in placed]
-
-
-def layout_for(path: Path, layout: str | os.PathLike[str] | None, rate_hz: float | None) -> GivenLayout:
-    """Return the layout that is given, or an empty one for a table or arrays, whose rate `rate_hz` says."""
-    if layout is not None or rate_hz is None or not path.exists():
-        return layout
-    files = files_in(path) if is_folder(path) else [path]
-    undescribed = [
-        file
-        for file in files
-        if file.is_file() and Layout.beside(file) is None and kind_of(file) in ("table", "arrays")
-    ]
-    return Layout(path.with_name(layout_name(path))) if undescribed else None
 
 
 def names_topic(bag: Path, topic: object, layout: str | os.PathLike[str] | None) -> bool:

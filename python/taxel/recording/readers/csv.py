@@ -28,6 +28,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.form import Form
 from taxel.formats.layout import Table
+from taxel.formats.lines import odd_lines
 from taxel.formats.table import Rows, events_of, read_rows
 from taxel.formats.times import in_order
 from taxel.frames import Frames
@@ -59,7 +60,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
         rows = read_rows(text, form, ends_empty=names[-1] == "intensity")
     else:
         rows = Rows.none(len(names) - 1)
-    lost = rows.odd.said()
+    lost = odd_lines(rows.odd)
     try:
         if tuple(names[:4]) == EVENTS:
             table: Events | Frames = events_of(path, form, names[1:], rows, array)

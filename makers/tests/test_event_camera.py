@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from formats.event_files import some_rows, write
 from refusal import refused_saying as refused
 
 import taxel
 from taxel import Events, FormatError, Frames
 from taxel.cli import main
-from taxel.formats import event_camera
 from taxel.formats.event_camera import Reduction
 from taxel.tasks import Training
-
-from .event_files import some_rows, write
+from taxel_makers import event_camera
 
 pytest.importorskip("faery")
 
