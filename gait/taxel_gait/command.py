@@ -19,7 +19,7 @@ from taxel_gait import kept, running
 from taxel_gait.cohort import Cohort, Entry
 from taxel_gait.measures import CENTRE
 from taxel_gait.measuring import Measured, StepOptions, measure
-from taxel_gait.tables import SYMMETRIES, Table, columns_of, curves, summary, symmetry
+from taxel_gait.tables import SUMMED, SYMMETRIES, Summary, Table, columns_of, curves, figure, summary, symmetry
 
 app = App(name="steps")
 
@@ -173,7 +173,7 @@ def _write(
     load = next((name for row in rows for name in row if name.startswith("mean_")), "mean").removeprefix("mean_")
     tables = [
         Table(about, columns_of(rows, _EMPTY), rows),
-        Table(about, [*group, "foot", "measure", "n", "mean", "sd", "cv_pct"], summed),
+        Table(about, [*group, "foot", *SUMMED], [one.row() for one in summed]),
         Table(about, [*group, "measure", "left", "right", *SYMMETRIES], symmetry(summed)),
         Table([*about, f"the load over stance: {load}"], [*group, "foot", "stance_pct", "n", "mean", "sd"], of_curves),
     ]
@@ -183,9 +183,10 @@ def _write(
     return paths
 
 
-def _lines(summed: Sequence[dict[str, Any]]) -> list[str]:
+def _lines(summed: Sequence[Summary]) -> list[str]:
     """Return the summary of one person as lines."""
     return [
-        f"  {one['foot']:<6} {one['measure']:<28} {one['mean']:>10.4g}  SD {one['sd']:<9.2g} n {one['n']}"
+        f"  {one.foot:<6} {one.measure:<28} {figure(one.means.mean, 4):>10}  "
+        f"SD {figure(one.means.sd, 2):<9} n {one.means.n}"
         for one in summed
     ]

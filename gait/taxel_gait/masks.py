@@ -17,7 +17,7 @@ from scipy import ndimage
 from taxel import ProblemError, Region
 from taxel_gait.prints import Placed, Print
 
-__all__ = ["MASKS", "Mask", "Picture", "find_mask", "mean_picture"]
+__all__ = ["MASKS", "Mask", "Picture", "find_mask", "laid_on", "mean_picture"]
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _HEEL, _FOREFOOT = (0.05, 0.30), (0.55, 0.80)
 FAN = (0.30, 0.47, 0.64, 0.81)
 #: The row of the metatarsal heads: between shares of the length, near one, medially; and laterally behind it.
 _HEADS, _HEAD, _HEAD_WIDTH, _MEDIAL, _BEHIND, _BEHIND_WIDTH = (0.55, 0.86), 0.73, 0.12, 0.55, 0.06, 0.05
-#: The toe line: ahead of the heads at least, at most so far on the way to the tip, and the prior, medially and laterally.
+#: The toe line: ahead of the heads at least; at most so far on the way to the tip; the prior, medially and laterally.
 _AHEAD, _MOST, _PRIOR, _PRIOR_WEIGHT, _CELLS = 0.03, 0.62, (0.32, 0.22), 6.0, 2
 #: An island with less than this share of the metatarsals' load is a toe.
 _ISLAND = 0.15
@@ -174,20 +174,15 @@ class Mask:
         """Return where the toes begin at a share of the width, mm from the heel."""
         return float(np.interp(w, self.toe_line[:, 0], self.toe_line[:, 1]))
 
-    def regions(self, placed: Placed, mask: str = "nine") -> list[Region]:
-        """Return the regions on the array of a print, in mm.
+    def regions(self, mask: str = "nine") -> list[Region]:
+        """Return the regions in the foot's own mm.
 
         Parameters
         ----------
-        placed : Placed
-            How the print lies.
         mask : str
             One of `MASKS`.
         """
-        return [
-            Region(name, tuple(map(tuple, placed.on_array(self._outline(band, a, b)).tolist())))
-            for name, (band, a, b) in MASKS[mask].items()
-        ]
+        return [_region(name, self._outline(*part)) for name, part in MASKS[mask].items()]
 
     def _outline(self, band: str, a: float, b: float) -> Floats:
         """Return the corners of a region, mm in the foot."""
@@ -210,6 +205,23 @@ class Mask:
         if band == "forefoot":
             return np.concatenate([front, self.line(w1, [self.midfoot]), self.line(w0, [self.midfoot])])
         return np.concatenate([front, self.line(w1, [high]), self.line(w0, [high])])
+
+
+def laid_on(regions: Sequence[Region], placed: Placed) -> list[Region]:
+    """Return regions of a foot on the array of a print, mm.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        In the foot's own mm.
+    placed : Placed
+        How the print lies.
+    """
+    return [_region(one.name, placed.on_array(np.array(one.corners))) for one in regions]
+
+
+def _region(name: str, corners: Floats) -> Region:
+    return Region(name, tuple((float(x), float(y)) for x, y in corners))
 
 
 def find_mask(picture: Picture) -> Mask:
@@ -240,7 +252,7 @@ def find_mask(picture: Picture) -> Mask:
     unrolled = np.take_along_axis(values, column, axis=1)
     head = _heads(unrolled, share, w)
     line = _toe_line(unrolled, share, w, head)
-    line = _behind_islands(unrolled, share, w, line, head)
+    line = _behind_islands(unrolled, share, line, head)
     beyond = np.where(share[:, None] > line, unrolled, 0.0).sum(axis=0)
     near = (w >= _HALLUX[0]) & (w <= _HALLUX[1])
     cost = beyond[near] / max(beyond.max(), 1e-12) + _PRIOR_WEIGHT * (w[near] - _HALLUX_AT) ** 2
@@ -274,7 +286,7 @@ def _heads(unrolled: Floats, share: Floats, w: Floats) -> Floats:
     outer = unrolled[rows][:, w >= _MEDIAL].sum(axis=1)
     outer = outer * np.exp(-(((near - (medial - _BEHIND)) / _BEHIND_WIDTH) ** 2))
     lateral = near[outer.argmax()] if outer.any() else medial - _BEHIND
-    return np.interp(w, (_MEDIAL / 2, (1 + _MEDIAL) / 2), (medial, lateral))
+    return np.asarray(np.interp(w, (_MEDIAL / 2, (1 + _MEDIAL) / 2), (medial, lateral)))
 
 
 def _toe_line(unrolled: Floats, share: Floats, w: Floats, head: Floats) -> Floats:
@@ -302,7 +314,7 @@ def _toe_line(unrolled: Floats, share: Floats, w: Floats, head: Floats) -> Float
     return share[rows[::-1]]
 
 
-def _behind_islands(unrolled: Floats, share: Floats, w: Floats, line: Floats, head: Floats) -> Floats:
+def _behind_islands(unrolled: Floats, share: Floats, line: Floats, head: Floats) -> Floats:
     """Return the toe line behind islands of little load in front of the metatarsal heads, which are toes."""
     of_forefoot = (unrolled > 0) & (share[:, None] > _MIDFOOT_ENDS) & (share[:, None] <= line)
     groups, count = ndimage.label(of_forefoot, np.ones((3, 3)))
@@ -322,4 +334,4 @@ def _simpler(line: Floats) -> Floats:
     """Return a line of fewer points: those where its direction changes."""
     slopes = np.diff(line[:, 1])
     keep = np.concatenate([[True], ~np.isclose(slopes[1:], slopes[:-1], atol=1e-6), [True]])
-    return line[keep]
+    return np.asarray(line[keep])

@@ -83,7 +83,7 @@ class Print:
         values = np.asarray(self.frames.maximum(), np.float64)
         groups, count = ndimage.label(values > self.above, np.ones((3, 3)))
         sizes = ndimage.sum_labels(np.ones_like(values), groups, np.arange(count + 1))
-        return np.where((groups > 0) & (sizes[groups] >= _GROUP), values, 0.0)
+        return np.asarray(np.where((groups > 0) & (sizes[groups] >= _GROUP), values, 0.0))
 
     @cached_property
     def load(self) -> tuple[Floats, str]:
@@ -93,12 +93,12 @@ class Print:
     @cached_property
     def t(self) -> Floats:
         """The times of the frames from the first one, s."""
-        return (self.frames.t - self.frames.t[0]) / 1e6
+        return np.asarray((self.frames.t - self.frames.t[0]) / 1e6)
 
     @cached_property
     def path(self) -> Floats:
         """The path of the centre of pressure (`Frames.centre_path`), mm."""
-        return self.frames.centre_path()
+        return np.asarray(self.frames.centre_path())
 
     def times_at(self, share: float) -> tuple[float, float]:
         """Return when the load is first, and last, at a share of its largest, s from the first loaded frame."""
@@ -139,13 +139,13 @@ class Placed:
         return right if self.side != "left" else (-right[0], -right[1])
 
     def in_foot(self, points: Floats) -> Floats:
-        """Return points of the array, shape (n, 2), as mm from the medial to the lateral side, and from heel to toes."""
+        """Return points of the array, shape (n, 2), as mm from medial to lateral and from heel to toes."""
         apart = points - np.array(self.heel)
         return np.stack([apart @ np.array(self.lateral), apart @ np.array(self.along)], axis=1)
 
     def on_array(self, points: Floats) -> Floats:
         """Return points of the foot (`in_foot`) on the array, mm."""
-        return np.array(self.heel) + points[:, :1] * np.array(self.lateral) + points[:, 1:] * np.array(self.along)
+        return np.asarray(self.heel + points[:, :1] * np.array(self.lateral) + points[:, 1:] * np.array(self.along))
 
 
 def place(one: Print, side: str = "") -> Placed:
@@ -195,7 +195,7 @@ def place(one: Print, side: str = "") -> Placed:
         if not (_BEGINS[0] < begin < _BEGINS[1] and _ENDS[0] < end < _ENDS[1]):
             doubts.append(f"partial: the path goes from {100 * begin:.0f} to {100 * end:.0f} % of the length")
     if not side and width:
-        vote = _vote(share, u, path_u, one, width)
+        vote = _vote(share, u, path_u, width)
         side = "" if abs(vote) < _UNDECIDED else "left" if vote > 0 else "right"
         if not side:
             doubts.append("the side is not known: say --side")
@@ -221,7 +221,7 @@ def _foot_axis(corners: Floats, along: Floats) -> tuple[Floats, Floats]:
     first, middle = along, corners.mean(axis=0)
     for _ in range(_ROUNDS):
         across = np.array([-along[1], along[0]])
-        s, u = corners @ along, corners @ across
+        s = corners @ along
         share = (s - s.min()) / np.ptp(s)
         bands = [corners[(share > low) & (share < high)] for low, high in (_HEEL, _FOREFOOT)]
         if not all(map(len, bands)):
@@ -239,7 +239,7 @@ def _foot_axis(corners: Floats, along: Floats) -> tuple[Floats, Floats]:
     return along, middle
 
 
-def _vote(share: Floats, u: Floats, path_u: Floats, one: Print, width: float) -> float:
+def _vote(share: Floats, u: Floats, path_u: Floats, width: float) -> float:
     """Return by how much the big toe's side is to the right of the axis: above 0 of a left foot."""
     fore = (share > _FOREFOOT[0]) & (share < _FOREFOOT[1])
     ahead = share > 0.85

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from taxel.report import write_whole
 from taxel.report.page import render
 from taxel_gait.drawing import COLOURS, LEFT_OUT, Axes, spanned
-from taxel_gait.tables import SYMMETRIES, curves, summary, symmetry
+from taxel_gait.tables import SYMMETRIES, curves, figure, summary, symmetry
 
 __all__ = ["write_report"]
 
@@ -74,9 +74,10 @@ def _sheet(
     feet = sorted({row["foot"] for row in rows})
     by_measure: dict[str, dict[str, list[str]]] = {}
     for one in summed:
-        if one["measure"].startswith(_SHOWN) and not one["measure"].endswith("_peak_pct"):
-            cells = [str(one["n"]), _figure(one["mean"], 4), _figure(one["sd"], 2), f"{one['cv_pct']:.1f}"]
-            by_measure.setdefault(one["measure"], {})[one["foot"]] = cells
+        if one.measure.startswith(_SHOWN) and not one.measure.endswith("_peak_pct"):
+            means = one.means
+            cells = [str(means.n), figure(means.mean, 4), figure(means.sd, 2), f"{means.cv_pct:.1f}"]
+            by_measure.setdefault(one.measure, {})[one.foot] = cells
     used = {name: sum(row["used"] == name for row in rows) for name in dict.fromkeys(row["used"] for row in rows)}
     out = ", ".join(f"{count} {name}" for name, count in used.items() if name != "yes")
     return {
@@ -89,11 +90,6 @@ def _sheet(
         "curve": _curve(rows, over_stance),
         "strides": _strides(rows),
     }
-
-
-def _figure(value: float, digits: int) -> str:
-    """Return a number with so many significant digits, without an exponent; "" where it is not known."""
-    return "" if np.isnan(value) else np.format_float_positional(value, digits, fractional=False, trim="-")
 
 
 def _unit(rows: Sequence[Mapping[str, Any]]) -> str:
