@@ -26,7 +26,16 @@ _SCALE, _EACH = 1.15, 2
 #: Where marks are on the path, % of the time that is known.
 _MARKS = (0, 25, 50, 75, 100)
 #: What the table shows of each region.
-_SHOWN = ("max_", "peak_pressure_", "contact_area_cm2", "contact_time_s", "fti_", "impulse_share", "pti_peak_cell_")
+_SHOWN = (
+    "max_force",
+    "max_sum",
+    "peak_pressure_",
+    "contact_area_cm2",
+    "contact_time_s",
+    "fti_",
+    "impulse_share",
+    "pti_peak_cell_",
+)
 
 
 def write_report(
@@ -73,7 +82,8 @@ def write_report(
                 ],
                 "key": [
                     (one["name"], COLOURS[k % len(COLOURS)])
-                    for k, one in enumerate(next(iter(by_side.values()))["regions"])
+                    for foot in [*by_side.values()][:1]
+                    for k, one in enumerate(foot["regions"])
                 ],
                 **_table(summed[person]),
             }
@@ -139,7 +149,7 @@ def _drawing(size: tuple[float, float], title: str, *marks: str) -> Markup:
     words = f'<text x="2" y="10">{escape(title)}</text>'
     return Markup(
         f'<svg viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}" role="img" '
-        f'font-family="system-ui, sans-serif" font-size="10">{words}{"".join(marks)}</svg>'
+        f'font-family="system-ui, sans-serif" font-size="10">{"".join(marks)}{words}</svg>'
     )
 
 
