@@ -120,7 +120,8 @@ def steps(
 def _label_tables(entry: Entry, out: Path | None) -> list[Path]:
     """Return where the table of labels of each file is."""
     if out is None:
-        return [path.with_name(f"{Path(path.name.removesuffix('.gz')).stem}.steps.csv") for path in entry.paths]
+        # As the page names its tables of labels.
+        return [path.with_name(f"{path.stem}.steps.csv") for path in entry.paths]
     if len(entry.paths) > 1:
         return [out / f"{path.stem}.steps.csv" for path in entry.paths]
     return [out / f"{entry.name}.steps.csv"]
