@@ -98,6 +98,7 @@ def footprint(
             file.parent.mkdir(parents=True, exist_ok=True)
             taxel.write_regions(file, own, overwrite=True)
     about = _about(rows, feet, options, left_out)
+    about += dict.fromkeys(line for one in measured for line in one.about)
     load = next(name.removeprefix("mean_") for name in rows[0] if name.startswith("mean_"))
     summed = [*summary(rows), *summary(regions)]
     means = _means(rows, [one for each in measured for one in each.curves])
@@ -162,13 +163,16 @@ def _about(
     reasons = {} if options.saturation is not None else {"saturated_cells": "say --saturation VALUE"}
     if options.mask != "footscan":
         reasons["balance_foot_pct, balance_forefoot_pct"] = "of footscan's regions: say --mask footscan"
-    return [
-        f"taxel {taxel.__version__}, taxel footprint",
+    of_prints = [
         f"regions: {options.mask}, {whose}; a cell counts as loaded above {above}",
         "stance: from the first loaded frame to the last; contact and lift at 5 and 10 % of the largest load beside it",
         "cells that a border cuts count with their share of area, for peaks where their middle lies",
         "side: as seen from above, by the print, unless it is stated",
         "path of the centre (cop): where the load is above 2 % of its maximum; cpei: at 2/3 of the length, above 5 %",
+    ]
+    return [
+        f"taxel {taxel.__version__}, taxel footprint",
+        *(of_prints if any(feet.values()) else ()),
         f"means are of {used['yes']} prints that are used; left out: "
         + ("; ".join(f"{count} {why}" for why, count in used.items() if why != "yes") or "none"),
         *(f"regions read from {file}" for file in kept),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -72,24 +72,28 @@ def write_report(
                 "feet": [
                     {
                         "side": side or "side not known",
-                        "prints": foot["prints"],
-                        "map": _map(foot, side),
-                        "picture": _picture(foot, side),
-                        "whole": _curves(curves[person, side], ["whole"], load),
-                        "regions": _curves(curves[person, side], [one["name"] for one in foot["regions"]], load),
+                        "pictures": [
+                            draw(foot, side) for foot in [by_side.get(side)] if foot for draw in (_map, _picture)
+                        ],
+                        "whole": _curves(own, ["whole"], load),
+                        "regions": _curves(own, [name for name in own if name != "whole"], load),
                     }
-                    for side, foot in sorted(by_side.items())
+                    for (whose, side), own in sorted(curves.items())
+                    if whose == person
                 ],
-                "key": [
-                    (one["name"], COLOURS[k % len(COLOURS)])
-                    for foot in [*by_side.values()][:1]
-                    for k, one in enumerate(foot["regions"])
-                ],
+                "key": _key(next((own for (whose, _), own in curves.items() if whose == person), {})),
+                "prints": {one.foot or "side not known": one.means.n for one in summed[person] if not one.region},
                 **_table(summed[person]),
             }
         )
     text = render("footprints.html.j2", package="taxel_gait", about=about, sheets=sheets)
     write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
+
+
+def _key(regions: Iterable[str]) -> list[tuple[str, str]]:
+    """Return the name and the colour of each region."""
+    names = [name for name in regions if name != "whole"]
+    return [(name, COLOURS[k % len(COLOURS)]) for k, name in enumerate(names)]
 
 
 def _table(rows: Sequence[Summary]) -> dict[str, Any]:
@@ -98,15 +102,19 @@ def _table(rows: Sequence[Summary]) -> dict[str, Any]:
     names = [name for name in dict.fromkeys(row.measure for row in of_regions) if name.startswith(_SHOWN)]
     by_region: dict[tuple[str, str], dict[str, str]] = {}
     for row in of_regions:
-        cell = f"{figure(row.means.mean, 4)} ± {figure(row.means.sd, 2)}"
-        by_region.setdefault((row.foot, row.region), {})[row.measure] = cell
+        by_region.setdefault((row.foot, row.region), {})[row.measure] = _spread(row)
     whole = [
-        f"{row.foot} {row.measure}: {figure(row.means.mean, 4)} ± {figure(row.means.sd, 2)}"
+        f"{row.foot} {row.measure}: {_spread(row)}"
         for row in rows
         if not row.region and row.measure in ("arch_index", "cpei_pct", "stance_s", "print_length_mm")
     ]
     cells = [[foot, region, *(own.get(name, "") for name in names)] for (foot, region), own in by_region.items()]
     return {"columns": names, "cells": cells, "whole": whole}
+
+
+def _spread(row: Summary) -> str:
+    """Return a mean, with its standard deviation where there are several."""
+    return f"{figure(row.means.mean, 4)}" + f" ± {figure(row.means.sd, 2)}" * (row.means.n > 1)
 
 
 def _mirror(side: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +17,7 @@ from taxel.cli.app import Limits
 from taxel.options import Reading
 from taxel.recording.opening import sensors
 from taxel_gait.cohort import Entry
-from taxel_gait.feet import Foot
+from taxel_gait.feet import Foot, feet_of
 from taxel_gait.loads import balances, curves_of, loads_of, of_print, of_region
 from taxel_gait.masks import MASKS, Picture, find_mask, laid_on, mean_picture
 from taxel_gait.prints import Placed, Print, place
@@ -25,8 +26,11 @@ from taxel_gait.walk import steps_of
 
 __all__ = ["FootprintOptions", "Footprints", "Person", "mask_file", "measure_person", "people_of"]
 
+#: Which sensors of insoles belong together, by the kind of file.
+INSOLES = Path(__file__).parent / "insoles"
 #: Regions whose names begin so are toes.
 _TOES = ("hallux", "toe")
+_NO_GRID = "empty: areas, what is divided by them, path, cpei_pct, arch_index: insoles of few sensors have no grid"
 #: A path over stance has so many points.
 _POINTS = 101
 
@@ -40,6 +44,9 @@ class FootprintOptions:
     mask
         The regions: nine (heel, midfoot, metatarsals 1 to 5, hallux, toes), seven (metatarsals 2-3 and 4-5 pooled),
         pedar (nine of its own), footscan (ten), or thirds of the length.
+    sensors
+        For insoles of few sensors a file of regions that says which sensors belong together. Default: that of the
+        maker, which comes with this command (gaitpdb, moticon, pedar).
     own_mask
         Find the regions of each print on itself instead of on the person's mean footprint.
     definition
@@ -57,6 +64,7 @@ class FootprintOptions:
     """
 
     mask: str = "nine"
+    sensors: Annotated[Path | None, Parameter(metavar="FILE")] = None
     own_mask: bool = False
     definition: Annotated[str | None, Parameter(metavar="KIND:A,B")] = None
     side: Annotated[str, Parameter(metavar="left|right")] = ""
@@ -70,6 +78,11 @@ class FootprintOptions:
             raise ProblemError(f"--side {self.side}: must be left or right")
         if self.definition is not None:
             Definition.of(self.definition)
+
+    def definition_of(self, foot: Foot) -> Definition:
+        """Return the definition by which the steps of an insole are found."""
+        given = self.definition
+        return Definition.usual(is_channel=foot.is_channel) if given is None else Definition.of(given)
 
 
 @dataclass(frozen=True)
@@ -101,6 +114,8 @@ class Footprints:
     failed : dict from str to str
         Why a recording was not measured.
     warnings : list of str
+    about : list of str
+        What the tables say of the regions.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -109,6 +124,7 @@ class Footprints:
     feet: dict[str, Any] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    about: list[str] = field(default_factory=list)
 
 
 def people_of(entries: Sequence[Entry]) -> list[Person]:
@@ -129,9 +145,11 @@ class _Footfall(NamedTuple):
 
     keys: dict[str, Any]
     one: Print
-    placed: Placed
+    #: None of an insole of few sensors, whose regions follow.
+    placed: Placed | None
     used: str
     weight_kg: float | None
+    regions: tuple[Region, ...] = ()
 
 
 def measure_person(person: Person, options: FootprintOptions, reading: Reading, folder: Path) -> Footprints:
@@ -148,35 +166,70 @@ def measure_person(person: Person, options: FootprintOptions, reading: Reading, 
     found, footfalls = Footprints(), list[_Footfall]()
     for entry in person.entries:
         try:
-            footfalls += _footfalls(entry, options, reading)
+            footfalls += _footfalls(entry, options, reading, found.about)
         except (taxel.Error, OSError) as error:
             found.failed[entry.name] = str(error)
-    sides = sorted({one.placed.side for one in footfalls if one.used == "yes"})
+    whole = [one for one in footfalls if one.used == "yes" and one.placed is not None]
+    sides = sorted({one.keys["foot"] for one in whole})
     for side in sides:
-        own = [one for one in footfalls if one.used == "yes" and one.placed.side == side]
+        own = [one for one in whole if one.keys["foot"] == side]
         found.feet[side] = _foot(person, side, own, options, folder)
     for one in footfalls:
         _measure(found, one, options)
-    if len(sides) == 1 and not options.side and len(footfalls) > 1 and not any(e.side for e in person.entries):
+    if len(sides) == 1 and not options.side and len(whole) > 1 and not any(e.side for e in person.entries):
         found.warnings.append(
             f"{person.name}: all prints are {sides[0]} feet, seen from above; say --side if that is wrong"
         )
     return found
 
 
-def _footfalls(entry: Entry, options: FootprintOptions, reading: Reading) -> Iterator[_Footfall]:
-    """Yield the footfalls of a recording."""
+def _footfalls(entry: Entry, options: FootprintOptions, reading: Reading, about: list[str]) -> Iterator[_Footfall]:
+    """Yield the footfalls of a recording; `about` gets what is to be said of regions that a file states."""
     if len(entry.paths) > 1:
         raise ProblemError("footprints are measured a recording at a time")
     trials = reading.open_trials(entry.paths[0])
     for trial in trials:
+        name = trial.name if len(trials) > 1 else entry.name
+        if all(sensor.array.pitch_mm is None for sensor in sensors(trial)):
+            yield from _of_insoles(trial, entry, name, options, about)
+            continue
         for sensor in sensors(trial):
-            name = trial.name if len(trials) > 1 else entry.name
             for number, used, one in _prints(sensor, options):
                 keys = {"recording": name, "person": entry.person, "condition": entry.condition, "step": number}
                 placed = place(one, options.side or entry.side or sensor.side)
                 doubts = "; ".join(placed.doubts)
-                yield _Footfall(keys, one, placed, doubts or used, entry.weight_kg)
+                yield _Footfall(keys | {"foot": placed.side}, one, placed, doubts or used, entry.weight_kg)
+
+
+def _of_insoles(
+    trial: Recording, entry: Entry, name: str, options: FootprintOptions, about: list[str]
+) -> Iterator[_Footfall]:
+    """Yield the steps of insoles of few sensors, whose regions a file states.
+
+    Raises
+    ------
+    ProblemError : no such file for the maker, and none given
+    """
+    file = INSOLES / f"{trial.kind}.regions.json" if options.sensors is None else options.sensors
+    if options.sensors is None and not file.exists():
+        known = ", ".join(sorted(one.name.partition(".")[0] for one in INSOLES.glob("*.json")))
+        raise ProblemError(
+            f"{trial.title}: no pitch is known, and no regions of its sensors (known: {known}): give a layout file "
+            "with the pitch, or --sensors FILE"
+        )
+    regions = taxel.read_regions(file)
+    stated = f"sensors of regions: {file.name}: {json.loads(file.read_text('utf-8')).get('about', '')}".rstrip(": ")
+    about += [line for line in (stated, _NO_GRID) if line not in about]
+    feet = feet_of([trial], options.side or entry.side)
+    stances = [
+        find_stances(foot.t, foot.force, options.definition_of(foot), is_channel=foot.is_channel) for foot in feet
+    ]
+    for step in steps_of(feet, stances, [np.zeros(len(one.contact), bool) for one in stances]):
+        foot = feet[step.foot]
+        keys = {"recording": name, "person": entry.person, "condition": entry.condition, "step": step.number}
+        if step.used != "cut":
+            one = Print(foot.frames[step.first : step.end], options.above or 0.0)
+            yield _Footfall(keys | {"foot": foot.side}, one, None, step.used, entry.weight_kg, regions)
 
 
 def _prints(recording: Recording, options: FootprintOptions) -> Iterator[tuple[int, str, Print]]:
@@ -186,12 +239,7 @@ def _prints(recording: Recording, options: FootprintOptions) -> Iterator[tuple[i
     holds one footfall.
     """
     foot = Foot.of(recording)
-    definition = (
-        Definition.usual(is_channel=foot.is_channel)
-        if options.definition is None
-        else Definition.of(options.definition)
-    )
-    stances = find_stances(foot.t, foot.force, definition, is_channel=foot.is_channel)
+    stances = find_stances(foot.t, foot.force, options.definition_of(foot), is_channel=foot.is_channel)
     whole = np.count_nonzero(~stances.cut_at_contact & ~stances.cut_at_lift)
     if whole < 2:
         yield 1, "yes", Print.of(foot.frames, options.above)
@@ -205,12 +253,12 @@ def _foot(
     person: Person, side: str, own: Sequence[_Footfall], options: FootprintOptions, folder: Path
 ) -> dict[str, Any]:
     """Return a foot's mean footprint and its regions: those that a person left in a file, or those that are found."""
-    pictures = [Picture.of(one.one, one.placed) for one in own]
+    pictures = [Picture.of(one.one, one.placed) for one in own if one.placed is not None]
     mean = mean_picture(pictures)
     file = mask_file(folder, person.name, side, options.mask)
     kept = file.exists()
     regions = list(taxel.read_regions(file)) if kept else find_mask(mean).regions(options.mask)
-    paths = [_over_stance(one) for one in own]
+    paths = [_over_stance(one.one, one.placed) for one in own if one.placed is not None]
     return {
         "mean": mean.values.round(3).tolist(),
         "most": np.max([one.values for one in pictures], axis=0).round(3).tolist(),
@@ -221,19 +269,19 @@ def _foot(
     }
 
 
-def _over_stance(one: _Footfall) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _over_stance(one: Print, placed: Placed) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return the path of the centre at 0 to 100 % of the time in which it is known, in the foot's own mm."""
-    path = one.placed.in_foot(one.one.path)
+    path = placed.in_foot(one.path)
     known = np.isfinite(path[:, 0])
-    t = one.one.t[known]
+    t = one.t[known]
     at = np.linspace(t[0], t[-1], _POINTS)
     return np.stack([np.interp(at, t, path[known, k]) for k in (0, 1)], axis=1)
 
 
 def _measure(found: Footprints, footfall: _Footfall, options: FootprintOptions) -> None:
     """Add what is measured of a footfall; one that is doubtful has no regions."""
-    keys, one, placed, used, weight_kg = footfall
-    keys = keys | {"foot": placed.side, "used": used, "contact_s": float(one.frames.t[0]) / 1e6}
+    keys, one, placed, used, weight_kg, _ = footfall
+    keys = keys | {"used": used, "contact_s": float(one.frames.t[0]) / 1e6}
     regions = _regions(found, footfall, options)
     loads = loads_of(one, regions)
     toes = [region for region in regions if region.name.startswith(_TOES)]
@@ -251,13 +299,16 @@ def _measure(found: Footprints, footfall: _Footfall, options: FootprintOptions) 
 
 def _regions(found: Footprints, footfall: _Footfall, options: FootprintOptions) -> list[Region]:
     """Return the regions on a print."""
-    if footfall.placed.doubts or footfall.placed.side not in found.feet:
+    placed = footfall.placed
+    if placed is None:
+        return list(footfall.regions)
+    if placed.doubts or placed.side not in found.feet:
         return []
     if options.own_mask:
-        own = find_mask(Picture.of(footfall.one, footfall.placed)).regions(options.mask)
+        own = find_mask(Picture.of(footfall.one, placed)).regions(options.mask)
     else:
-        own = [Region(one["name"], one["polygon"]) for one in found.feet[footfall.placed.side]["regions"]]
-    return laid_on(own, footfall.placed)
+        own = [Region(one["name"], one["polygon"]) for one in found.feet[placed.side]["regions"]]
+    return laid_on(own, placed)
 
 
 def _plain(cells: Mapping[str, float]) -> dict[str, float | None]:

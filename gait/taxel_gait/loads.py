@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 #: The path of the centre is measured where the load is above this share of its maximum; for the index of its excursion.
 _PATH, _EXCURSION = 0.02, 0.05
 _CM2 = 100.0
+#: Measures that need the areas of the cells.
+_OF_AREA = ("contact_area", "max_mean_pressure", "region_pressure", "pti_force_area", "pti_mean_curve")
 
 
 class Loads(NamedTuple):
@@ -70,7 +72,7 @@ def loads_of(one: Print, regions: Sequence[Region]) -> dict[str, Loads]:
     values = np.where(there, one.frames.values, 0.0)[:, rows, columns].reshape(n, -1)
     loaded = values > one.above
     values = np.where(loaded, values, 0.0)
-    area = array.row_mm * array.column_mm
+    area = 1.0 if array.pitch_mm is None else array.row_mm * array.column_mm
     # Force is the pressure times the area, or the sum of cells that are forces or counts themselves.
     of_force = 1.0 if one.load[1] != "N" or one.frames.unit == "N" else area * _newton(one)
     shares, inside = {"whole": np.ones(there.shape)}, {"whole": there}
@@ -125,7 +127,7 @@ def of_region(one: Print, own: Loads, total_fti: float, saturation: float | None
     fti = float(np.trapezoid(own.force, t))
     found = {
         f"max_{load}_{unit}": float(own.force.max()),
-        f"peak_pressure_{value}": float(own.peak.max()),
+        f"peak_{'sensor' if value == 'N' else 'pressure'}_{value}": float(own.peak.max()),
         f"max_mean_pressure_{value}": float(_over(own.pressure_area, own.area).max(initial=0.0)),
         f"region_pressure_{value}": float(_over(own.pressure_area.max(keepdims=True), np.array([own.ever]))[0]),
         "contact_area_cm2": float(own.area.max()) / _CM2,
@@ -153,12 +155,14 @@ def of_region(one: Print, own: Loads, total_fti: float, saturation: float | None
         }
     if saturation is not None:
         found["saturated_cells"] = float(np.count_nonzero(own.most >= saturation))
-    return found
+    # Of sensors whose area is not known.
+    without = _OF_AREA if one.frames.array.pitch_mm is None else ()
+    return {name: measure for name, measure in found.items() if not name.startswith(without)}
 
 
 def of_print(
     one: Print,
-    placed: Placed,
+    placed: Placed | None,
     loads: Mapping[str, Loads],
     toes: Sequence[Region],
     saturation: float | None,
@@ -169,7 +173,8 @@ def of_print(
     Parameters
     ----------
     one : Print
-    placed : Placed
+    placed : Placed, optional
+        Not of an insole of few sensors.
     loads : mapping from region to Loads
         With that of the whole; without regions where the print is doubtful.
     toes : sequence of Region
@@ -186,12 +191,13 @@ def of_print(
         **of_region(one, whole, float(np.trapezoid(whole.force, t)), saturation),
         f"mean_{load}_{unit}": float(whole.force.mean()),
         **{name if name.endswith("_pct") else f"{name}_{unit}": at for name, at in peaks.items()},
-        "print_length_mm": placed.length,
-        "print_width_mm": placed.width,
     }
     del found["impulse_share_pct"]
     if weight_kg is not None and unit == "N":
         found["max_force_pct_weight"] = 100 * float(whole.force.max()) / (weight_kg * 9.80665)
+    if placed is None:
+        return found
+    found |= {"print_length_mm": placed.length, "print_width_mm": placed.width}
     path = placed.in_foot(one.path)
     counts = np.isfinite(path[:, 0]) & (one.load[0] > _PATH * one.load[0].max())
     if np.count_nonzero(counts) > 1:

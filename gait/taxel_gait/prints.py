@@ -81,6 +81,9 @@ class Print:
     def picture(self) -> Floats:
         """The largest value of each cell of the print, 0 elsewhere, shape (rows, columns)."""
         values = np.asarray(self.frames.maximum(), np.float64)
+        # The few sensors of an insole have no neighbours.
+        if self.frames.array.pitch_mm is None:
+            return np.asarray(np.where(values > self.above, values, 0.0))
         groups, count = ndimage.label(values > self.above, np.ones((3, 3)))
         sizes = ndimage.sum_labels(np.ones_like(values), groups, np.arange(count + 1))
         return np.asarray(np.where((groups > 0) & (sizes[groups] >= _GROUP), values, 0.0))

@@ -6,9 +6,11 @@ import json
 import numpy as np
 import pytest
 from drawn import drawn
+from walking import published, two_feet, write
 
 import taxel
 from taxel.cli import main
+from taxel_gait.footprints import INSOLES
 
 TABLES = ("footprints.csv", "regions.csv", "summary.csv", "symmetry.csv", "curves.csv", "report.html")
 
@@ -60,8 +62,8 @@ def test_a_folder_of_prints_gives_tables_masks_and_a_page(plate, tmp_path):
     )
     assert int(heel["n"]) == 2
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "left: 2 footprints" in page
-    assert "right: 2 footprints" in page
+    assert "left: 2 in means" in page
+    assert "right: 2 in means" in page
 
 
 def test_wide_has_a_row_a_print(plate, tmp_path):
@@ -119,6 +121,50 @@ def test_steps_of_an_insole_of_a_grid_are_prints(tmp_path):
     _, prints = table(tmp_path / "out" / "footprints.csv")
     assert len(prints) == 9
     assert [row["used"] for row in prints] == ["first", *["yes"] * 7, "last"]
+
+
+@pytest.mark.parametrize(("name", "regions"), [("gaitpdb", 4), ("pedar", 9), ("moticon", 4)])
+def test_each_sensor_of_an_insole_is_in_one_region(name, regions):
+    file = INSOLES / f"{name}.regions.json"
+    taxels = [taxel_ for region in taxel.read_regions(file) for taxel_ in region.taxels]
+    assert len(taxel.read_regions(file)) == regions
+    assert sorted(taxels) == [(k, 0) for k in range({"gaitpdb": 8, "pedar": 99, "moticon": 16}[name])]
+
+
+def test_steps_of_an_insole_of_few_sensors_have_the_regions_of_a_file(tmp_path):
+    write(tmp_path / "GaCo01_01.txt", *two_feet(20.0))
+    assert run(tmp_path / "GaCo01_01.txt", "-o", tmp_path / "out") == 0
+    about, rows = table(tmp_path / "out" / "regions.csv")
+    assert any("gaitpdb.regions.json" in line for line in about)
+    used = [row for row in rows if row["used"] == "yes"]
+    # Sensors 1 to 3 carry 0.2, 0.1 and 0.1 of the load.
+    heel = [float(row["impulse_share_pct"]) for row in used if row["region"] == "heel"]
+    assert heel == pytest.approx([40] * len(heel), abs=0.1)
+    assert {float(row["max_force_N"]) for row in used if row["region"] == "toes"} == {80.0}
+    assert not any(name.startswith("contact_area") for name in rows[0])
+
+
+def test_an_insole_whose_sensors_nobody_states_is_refused(tmp_path, capsys):
+    values = np.abs(np.sin(np.arange(900) / 20))[:, None, None] * np.ones((1, 1, 5))
+    taxel.convert(taxel.Frames(values, np.arange(900) * 10_000, unit="N"), tmp_path / "five.npz")
+    assert run(tmp_path / "five.npz", "-o", tmp_path / "out") == 2
+    assert "--sensors FILE" in capsys.readouterr().err
+
+
+def test_places_of_moticon_give_the_centre_that_its_files_state():
+    from pandas import read_csv
+
+    stated = json.loads((INSOLES / "moticon.regions.json").read_text())
+    for path in sorted(published("insole_moticon").glob("*.txt")):
+        names = next(line for line in path.read_text("utf-8").splitlines()[::-1] if line.startswith("#"))
+        columns = names.lstrip("# ").split("\t")
+        rows = read_csv(path, sep="\t", comment="#", header=None, names=columns)
+        for foot in ("left", "right"):
+            pressures = rows[[name for name in columns if name.startswith(f"{foot} pressure")]].to_numpy()
+            centre = rows[[name for name in columns if name.startswith(f"{foot} center")]].to_numpy()
+            loaded = rows[f"{foot} total force[N]"].to_numpy() > 200
+            found = pressures @ np.array(stated["places"]) / pressures.sum(axis=1, keepdims=True)
+            assert np.nanstd((found - centre)[loaded], axis=0) == pytest.approx([0, 0], abs=0.02)
 
 
 def test_where_no_print_is_whole_the_page_says_so(tmp_path):
