@@ -168,11 +168,21 @@ def _about(
         "stance: from the first loaded frame to the last; contact and lift at 5 and 10 % of the largest load beside it",
         "cells that a border cuts count with their share of area, for peaks where their middle lies",
         "side: as seen from above, by the print, unless it is stated",
-        "path of the centre (cop): where the load is above 2 % of its maximum; cpei: at 2/3 of the length, above 5 %",
+        "cop: the path of the centre of pressure where the load is above 2 % of its maximum",
+        "cpei_pct: at 2/3 of the print's length, across, the path (load above 5 %) from the line between its ends, % "
+        "of the print's width there, lateral above 0",
+        "arch_index: area of the middle third / area, ever loaded, without toes, thirds from the heel to the front of "
+        "the metatarsals",
+        "max_mean_pressure: largest force / area loaded then; region_pressure: largest force / area ever loaded",
+        "contact_area: largest at one moment; contact_area_ever: loaded at any moment",
+        "pti_force_area: fti / area ever loaded; pti_mean_curve: integral of force / area loaded then",
     ]
     return [
         f"taxel {taxel.__version__}, taxel footprint",
         *(of_prints if any(feet.values()) else ()),
+        "fti: force-time integral by trapezoids; pti_peak_cell: largest integral of one cell; pti_peak_curve: integral "
+        "of the largest cell of each moment; loading_rate: 0.6 of the maximum / the time from 20 to 80 % of it",
+        "contact_time_s: frames in which it is loaded x their period; times and % from the first loaded frame",
         f"means are of {used['yes']} prints that are used; left out: "
         + ("; ".join(f"{count} {why}" for why, count in used.items() if why != "yes") or "none"),
         *(f"regions read from {file}" for file in kept),

@@ -19,6 +19,8 @@ __all__ = ["write_report"]
 
 #: The symmetry that the page shows; the tables have all.
 _SYMMETRY = next(iter(SYMMETRIES))
+#: The page has at most so many sheets: a browser shows no more at once.
+_SHEETS = 60
 #: A line of the strip is so long, s, and a step is drawn by each of so many points of its curve.
 _LINE_S, _EACH = 60.0, 5
 #: The measures of the page's table; units follow from the columns.
@@ -53,6 +55,7 @@ def write_report(
     sheets: dict[tuple[str, str], list[int]] = {}
     for k, row in enumerate(rows):
         sheets.setdefault((row["person"], row["condition"]), []).append(k)
+    others = len(sheets) - _SHEETS
     text = render(
         "report.html.j2",
         package="taxel_gait",
@@ -60,8 +63,9 @@ def write_report(
         definitions=definitions,
         sheets=[
             _sheet(" ".join(filter(None, key)), [rows[k] for k in own], [over_stance[k] for k in own])
-            for key, own in sheets.items()
+            for key, own in list(sheets.items())[:_SHEETS]
         ],
+        others=others,
     )
     write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
 
