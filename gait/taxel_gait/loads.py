@@ -68,8 +68,8 @@ def loads_of(one: Print, regions: Sequence[Region]) -> dict[str, Loads]:
     """
     array, n = one.frames.array, len(one.frames)
     there = one.picture > 0
-    rows, columns = (slice(k.min(), k.max() + 1) for k in np.nonzero(there))
-    values = np.where(there, one.frames.values, 0.0)[:, rows, columns].reshape(n, -1)
+    cells = np.flatnonzero(there)
+    values = one.frames.values.reshape(n, -1)[:, cells].astype(np.float64)
     loaded = values > one.above
     values = np.where(loaded, values, 0.0)
     area = 1.0 if array.pitch_mm is None else array.row_mm * array.column_mm
@@ -82,22 +82,22 @@ def loads_of(one: Print, regions: Sequence[Region]) -> dict[str, Loads]:
         except ProblemError:
             # A foot without toes on the array has none there.
             continue
-    weights = np.stack([share[rows, columns].ravel() for share in shares.values()], axis=1)
-    sums, areas = values @ weights, (loaded @ weights) * area
+    weights = np.stack([share.ravel()[cells] for share in shares.values()], axis=1)
+    sums, areas = values @ weights, (loaded.astype(np.float64) @ weights) * area
     ever = (loaded.any(axis=0) @ weights) * area
-    integrals, most = np.trapezoid(values, one.t, axis=0), values.max(axis=0)
+    integrals, most = np.asarray(np.trapezoid(values, one.t, axis=0)), values.max(axis=0)
     found = {}
     for k, name in enumerate(shares):
-        cells = np.flatnonzero(inside[name][rows, columns])
-        peak = values[:, cells].max(axis=1) if len(cells) else np.zeros(n)
+        own = np.flatnonzero(inside[name].ravel()[cells])
+        peak = values[:, own].max(axis=1) if len(own) else np.zeros(n)
         found[name] = Loads(
             sums[:, k] * of_force,
             sums[:, k] * area,
             peak,
             areas[:, k],
             float(ever[k]),
-            integrals[cells],
-            most[cells],
+            integrals[own],
+            most[own],
         )
     return found
 
