@@ -19,7 +19,7 @@ from taxel_gait import kept, running
 from taxel_gait.cohort import Cohort, Entry
 from taxel_gait.measures import CENTRE
 from taxel_gait.measuring import Measured, StepOptions, measure
-from taxel_gait.tables import SYMMETRIES, Table, columns_of, curves, summary, symmetry
+from taxel_gait.tables import SUMMED, SYMMETRIES, Summary, Table, columns_of, curves, figure, summary, symmetry
 
 app = App(name="steps")
 
@@ -27,6 +27,22 @@ app = App(name="steps")
 FOLDER = Path("taxel-steps")
 _TABLES = ("steps.csv", "summary.csv", "symmetry.csv", "curves.csv")
 _PAGE = "report.html"
+#: What the columns are, in words from which they can be computed anew.
+_WORDS = (
+    "a swing's base: the 25th percentile of its load, of a single sensor the 75th",
+    "stance_s: lift - contact; swing_s: the foot's next contact - lift; stride_s: next contact - contact; stance_pct: "
+    "stance / stride; cadence: 120 / stride_s, steps a minute",
+    "step_s: contact - the other foot's last contact; double_support_initial_s: the other foot's lift - contact; "
+    "double_support_terminal_s: lift - the other foot's next contact; single_support_s: stance without both",
+    "max, mean: of the samples from contact to before lift; impulse: trapezoids from contact to lift",
+    "first_peak, second_peak: the largest load of the first and of the second half of stance; valley: the least "
+    "between; _pct: when, % of stance; empty where a half's largest load is at 50 %",
+    "loading_rate: 0.6 of the maximum / the time from 20 to 80 % of it on the first rise, interpolated",
+    f"cop: the path of the centre of pressure where the load is above {100 * CENTRE:g} % of the step's maximum",
+    "turn or unusual: a stride or a stance off the foot's running median of 11 by more than 3 robust SD (1.4826 times "
+    "the median of all distances from it) and 8 %; turn: two or more of them within 2.5 s",
+    "a bout ends where both feet are loaded for over 1 s, at a gap over 0.1 s, at two contacts of one foot in a row",
+)
 #: Columns that insoles leave empty, and a plate's footprints do not.
 _EMPTY = ("saturated_cells", "cpei_pct", "arch_index")
 
@@ -76,9 +92,12 @@ def steps(
     with progress(output.json) as show:
         work = partial(_measure, by_entry, options, reading)
         found, failed = running.run(cohort.entries, work, stamps, folder, workers, show)
-    measured = {
-        entry: Measured.from_dict(one) for entry, one in zip(cohort.entries, found, strict=True) if one is not None
-    }
+    measured = dict[Entry, Measured]()
+    for k, entry in enumerate(cohort.entries):
+        # Of many recordings each is held once.
+        values, found[k] = found[k], None
+        if values is not None:
+            measured[entry] = Measured.from_dict(values)
     for entry, one in measured.items():
         for table, labels in zip(by_entry[entry], one.labels, strict=True):
             table.parent.mkdir(parents=True, exist_ok=True)
@@ -120,7 +139,8 @@ def steps(
 def _label_tables(entry: Entry, out: Path | None) -> list[Path]:
     """Return where the table of labels of each file is."""
     if out is None:
-        return [path.with_name(f"{Path(path.name.removesuffix('.gz')).stem}.steps.csv") for path in entry.paths]
+        # As the page names its tables of labels.
+        return [path.with_name(f"{path.stem}.steps.csv") for path in entry.paths]
     if len(entry.paths) > 1:
         return [out / f"{path.stem}.steps.csv" for path in entry.paths]
     return [out / f"{entry.name}.steps.csv"]
@@ -142,11 +162,7 @@ def _about(
     return [
         f"taxel {taxel.__version__}, taxel steps",
         *definitions,
-        "turn or unusual: a stride or a stance off the running median of 11 by more than 3 robust SD and 8 %; turn: "
-        "two or more of them within 2.5 s",
-        "a bout ends where both feet are loaded for over 1 s, at a gap, and at two contacts of one foot in a row",
-        "peaks: the largest load of either half of stance, the valley is the least between; loading rate: from 20 to "
-        f"80 % of the maximum; path of the centre (cop): where the load is above {100 * CENTRE:g} % of its maximum",
+        *_WORDS,
         f"means are of {used['yes']} steps that are used; left out: "
         + (", ".join(f"{count} {name}" for name, count in used.items() if name != "yes") or "none"),
         *(f"empty: {name}: {why}" for name, why in reasons.items()),
@@ -173,7 +189,7 @@ def _write(
     load = next((name for row in rows for name in row if name.startswith("mean_")), "mean").removeprefix("mean_")
     tables = [
         Table(about, columns_of(rows, _EMPTY), rows),
-        Table(about, [*group, "foot", "measure", "n", "mean", "sd", "cv_pct"], summed),
+        Table(about, [*group, "foot", *SUMMED], [one.row() for one in summed]),
         Table(about, [*group, "measure", "left", "right", *SYMMETRIES], symmetry(summed)),
         Table([*about, f"the load over stance: {load}"], [*group, "foot", "stance_pct", "n", "mean", "sd"], of_curves),
     ]
@@ -183,9 +199,10 @@ def _write(
     return paths
 
 
-def _lines(summed: Sequence[dict[str, Any]]) -> list[str]:
+def _lines(summed: Sequence[Summary]) -> list[str]:
     """Return the summary of one person as lines."""
     return [
-        f"  {one['foot']:<6} {one['measure']:<28} {one['mean']:>10.4g}  SD {one['sd']:<9.2g} n {one['n']}"
+        f"  {one.foot:<6} {one.measure:<28} {figure(one.means.mean, 4):>10}  "
+        f"SD {figure(one.means.sd, 2):<9} n {one.means.n}"
         for one in summed
     ]

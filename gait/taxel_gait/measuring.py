@@ -99,7 +99,7 @@ class Measured:
     ----------
     rows : list of dict
         One for each step, by the columns of `steps.csv`; None where there is no value.
-    curves : list of (list of float, or None)
+    curves : list of (sequence of float, or None)
         The load over the stance of each row, at 0 to 100 %; None of a step that is cut.
     labels : list of list of Note
         The rows of the table of labels of each file.
@@ -111,7 +111,7 @@ class Measured:
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
-    curves: list[list[float] | None] = field(default_factory=list)
+    curves: list[Sequence[float] | None] = field(default_factory=list)
     labels: list[list[taxel.Note]] = field(default_factory=list)
     reasons: dict[str, str] = field(default_factory=dict)
     definitions: list[str] = field(default_factory=list)
@@ -128,7 +128,9 @@ class Measured:
             [taxel.Note(**row | {"others": tuple(map(tuple, row["others"]))}) for row in of_file]
             for of_file in values["labels"]
         ]
-        return cls(**values | {"labels": labels})
+        # Numbers of NumPy take a tenth of the memory.
+        curves = [None if curve is None else np.array(curve, np.float32) for curve in values["curves"]]
+        return cls(**values | {"labels": labels, "curves": curves})
 
 
 def measure(entry: Entry, options: StepOptions, reading: Reading, tables: Sequence[Path]) -> Measured:

@@ -13,12 +13,14 @@ from markupsafe import Markup
 from taxel.report import write_whole
 from taxel.report.page import render
 from taxel_gait.drawing import COLOURS, LEFT_OUT, Axes, spanned
-from taxel_gait.tables import SYMMETRIES, curves, summary, symmetry
+from taxel_gait.tables import SYMMETRIES, curves, figure, summary, symmetry
 
 __all__ = ["write_report"]
 
 #: The symmetry that the page shows; the tables have all.
 _SYMMETRY = next(iter(SYMMETRIES))
+#: The page has at most so many sheets: a browser shows no more at once.
+_SHEETS = 60
 #: A line of the strip is so long, s, and a step is drawn by each of so many points of its curve.
 _LINE_S, _EACH = 60.0, 5
 #: The measures of the page's table; units follow from the columns.
@@ -53,6 +55,7 @@ def write_report(
     sheets: dict[tuple[str, str], list[int]] = {}
     for k, row in enumerate(rows):
         sheets.setdefault((row["person"], row["condition"]), []).append(k)
+    others = len(sheets) - _SHEETS
     text = render(
         "report.html.j2",
         package="taxel_gait",
@@ -60,8 +63,9 @@ def write_report(
         definitions=definitions,
         sheets=[
             _sheet(" ".join(filter(None, key)), [rows[k] for k in own], [over_stance[k] for k in own])
-            for key, own in sheets.items()
+            for key, own in list(sheets.items())[:_SHEETS]
         ],
+        others=others,
     )
     write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
 
@@ -74,9 +78,10 @@ def _sheet(
     feet = sorted({row["foot"] for row in rows})
     by_measure: dict[str, dict[str, list[str]]] = {}
     for one in summed:
-        if one["measure"].startswith(_SHOWN) and not one["measure"].endswith("_peak_pct"):
-            cells = [str(one["n"]), _figure(one["mean"], 4), _figure(one["sd"], 2), f"{one['cv_pct']:.1f}"]
-            by_measure.setdefault(one["measure"], {})[one["foot"]] = cells
+        if one.measure.startswith(_SHOWN) and not one.measure.endswith("_peak_pct"):
+            means = one.means
+            cells = [str(means.n), figure(means.mean, 4), figure(means.sd, 2), f"{means.cv_pct:.1f}"]
+            by_measure.setdefault(one.measure, {})[one.foot] = cells
     used = {name: sum(row["used"] == name for row in rows) for name in dict.fromkeys(row["used"] for row in rows)}
     out = ", ".join(f"{count} {name}" for name, count in used.items() if name != "yes")
     return {
@@ -89,11 +94,6 @@ def _sheet(
         "curve": _curve(rows, over_stance),
         "strides": _strides(rows),
     }
-
-
-def _figure(value: float, digits: int) -> str:
-    """Return a number with so many significant digits, without an exponent; "" where it is not known."""
-    return "" if np.isnan(value) else np.format_float_positional(value, digits, fractional=False, trim="-")
 
 
 def _unit(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -9,37 +9,45 @@ import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import taxel
 from taxel.report import write_whole
 from taxel.tasks import Workers
-from taxel_gait.cohort import Entry
 
 __all__ = ["run", "stamp"]
 
 #: The folder of what is known so far of a run that has not ended.
 PARTS = ".parts"
 
-Work = Callable[[Entry], dict[str, Any]]
+
+class Named(Protocol):
+    """A recording, or a person."""
+
+    @property
+    def name(self) -> str:
+        """What it is called in messages."""
+
+
+_T = TypeVar("_T", bound=Named)
 
 
 def run(
-    entries: Sequence[Entry],
-    work: Work,
+    entries: Sequence[_T],
+    work: Callable[[_T], dict[str, Any]],
     stamps: Sequence[str],
     folder: Path,
     workers: Workers,
     show: Callable[[str, int, int], object],
 ) -> tuple[list[dict[str, Any] | None], dict[str, str]]:
-    """Return what each recording gave, None where it failed, and why some failed.
+    """Return what each recording or person gave, None where it failed, and why some failed.
 
     What is known so far is kept in the folder until `clear`, so that a run that was stopped goes on.
 
     Parameters
     ----------
-    entries : sequence of Entry
-    work : function of an Entry
+    entries : sequence of Entry, or of Person
+    work : function of one of them
         It returns plain values for JSON, and can be pickled.
     stamps : sequence of str
         Which results are the same (`stamp`).
@@ -70,12 +78,12 @@ def clear(folder: Path) -> None:
     shutil.rmtree(folder / PARTS, ignore_errors=True)
 
 
-def stamp(entry: Entry, files: Sequence[Path], *how: object) -> str:
+def stamp(entry: object, files: Sequence[Path], *how: object) -> str:
     """Return a name of a result: another where a file, or how it is measured, is another.
 
     Parameters
     ----------
-    entry : Entry
+    entry : Entry or Person
     files : sequence of Path
         What the result depends on; they need not exist.
     *how : object
@@ -86,7 +94,7 @@ def stamp(entry: Entry, files: Sequence[Path], *how: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _tried(work: Work, entry: Entry) -> tuple[dict[str, Any] | None, str]:
+def _tried(work: Callable[[_T], dict[str, Any]], entry: _T) -> tuple[dict[str, Any] | None, str]:
     """Return what the work gives with its warnings, or why it failed."""
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")

@@ -14,10 +14,25 @@ from numpy.typing import NDArray
 
 from taxel.report import write_whole
 
-__all__ = ["KEYS", "SYMMETRIES", "Means", "Table", "curves", "means_of", "summary", "symmetry"]
+__all__ = [
+    "KEYS",
+    "SUMMED",
+    "SYMMETRIES",
+    "Means",
+    "Summary",
+    "Table",
+    "columns_of",
+    "curves",
+    "figure",
+    "means_of",
+    "summary",
+    "symmetry",
+]
 
 #: What names a step, and says whether it counts.
-KEYS = ("recording", "person", "condition", "foot", "step", "bout", "used")
+KEYS = ("recording", "person", "condition", "foot", "step", "bout", "region", "used")
+#: The columns of a summary after those that name a foot.
+SUMMED = ("measure", "n", "mean", "sd", "cv_pct")
 #: Times that are no measure.
 _NO_MEASURE = ("contact_s", "lift_s")
 #: Significant digits of a cell.
@@ -69,7 +84,8 @@ def _cell(value: Any, decimal_comma: bool) -> str:
 def columns_of(rows: Iterable[Mapping[str, Any]], last: Sequence[str] = ()) -> list[str]:
     """Return the columns of rows: keys, then measures in the order in which they first are, then `last`."""
     found = dict.fromkeys(name for row in rows for name in row)
-    return [*KEYS[:-1], *(name for name in found if name not in (*KEYS, *last)), *last, KEYS[-1]]
+    keys = [name for name in KEYS[:-1] if name in found]
+    return [*keys, *(name for name in found if name not in (*KEYS, *last)), *last, KEYS[-1]]
 
 
 class Means(NamedTuple):
@@ -83,6 +99,33 @@ class Means(NamedTuple):
     def cv_pct(self) -> float:
         """The coefficient of variation, %."""
         return 100 * self.sd / self.mean if self.mean else float("nan")
+
+
+class Summary(NamedTuple):
+    """The means of a measure of a person's foot in a condition; of one of its regions, or of the whole ("")."""
+
+    person: str
+    condition: str
+    foot: str
+    region: str
+    measure: str
+    means: Means
+
+    def row(self) -> dict[str, Any]:
+        """Return it as a row of a table."""
+        n, mean, sd = self.means
+        return {**self._asdict(), "n": n, "mean": mean, "sd": sd, "cv_pct": self.means.cv_pct}
+
+
+def figure(value: float, digits: int) -> str:
+    """Return a number with so many significant digits, without an exponent; "" where it is not known.
+
+    Examples
+    --------
+    >>> figure(6781.4, 2), figure(float("nan"), 2)
+    ('6800', '')
+    """
+    return "" if np.isnan(value) else np.format_float_positional(value, digits, fractional=False, trim="-")
 
 
 def means_of(values: Iterable[float | None]) -> Means:
@@ -107,30 +150,32 @@ def _groups(rows: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str, str], lis
     return {(*key, foot): by_foot[foot] for key, by_foot in found.items() for foot in sorted(by_foot)}
 
 
-def summary(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return n, mean, SD and CV of the steps that are used: a row a measure of a person, a condition and a foot."""
+def summary(rows: Sequence[Mapping[str, Any]]) -> list[Summary]:
+    """Return the means of the steps that are used: of each measure by person, condition, foot and region."""
     found = []
     names = [name for name in columns_of(rows) if name not in (*KEYS, *_NO_MEASURE)]
-    for (person, condition, foot), own in _groups(rows).items():
-        for name in names:
-            one = means_of(rows[k].get(name) for k in own)
-            if one.n:
-                cells = {"measure": name, "n": one.n, "mean": one.mean, "sd": one.sd, "cv_pct": one.cv_pct}
-                found.append({"person": person, "condition": condition, "foot": foot} | cells)
+    for region in dict.fromkeys(row.get("region", "") for row in rows):
+        of_region = [row for row in rows if row.get("region", "") == region]
+        for (person, condition, foot), own in _groups(of_region).items():
+            for name in names:
+                means = means_of(of_region[k].get(name) for k in own)
+                if means.n:
+                    found.append(Summary(person, condition, foot, region, name, means))
     return found
 
 
-def symmetry(summed: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the symmetries of each measure of each person and condition, from the rows of a `summary`."""
-    pairs: dict[tuple[str, str, str], dict[str, float]] = {}
-    for row in summed:
-        pairs.setdefault((row["person"], row["condition"], row["measure"]), {})[row["foot"]] = row["mean"]
+def symmetry(summed: Sequence[Summary]) -> list[dict[str, Any]]:
+    """Return the symmetries of each measure of each person, condition and region, from a `summary`."""
+    pairs: dict[tuple[str, str, str, str], dict[str, float]] = {}
+    for one in summed:
+        pairs.setdefault((one.person, one.condition, one.region, one.measure), {})[one.foot] = one.means.mean
     found = []
-    for (person, condition, name), by_foot in pairs.items():
+    for (person, condition, region, name), by_foot in pairs.items():
         left, right = by_foot.get("left", np.nan), by_foot.get("right", np.nan)
         if left > 0 and right > 0:
-            cells = {"person": person, "condition": condition, "measure": name, "left": left, "right": right}
-            found.append(cells | {column: of(left, right) for column, of in SYMMETRIES.items()})
+            keys = {"person": person, "condition": condition, "region": region, "measure": name}
+            cells = {"left": left, "right": right}
+            found.append(keys | cells | {column: of(left, right) for column, of in SYMMETRIES.items()})
     return found
 
 

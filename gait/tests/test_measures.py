@@ -119,8 +119,8 @@ ROWS = [
 
 def test_a_summary_is_of_the_steps_that_are_used():
     left, right = summary(ROWS)
-    assert (left["n"], left["mean"], left["sd"], left["cv_pct"]) == (3, 2.0, 1.0, 50.0)
-    assert (right["n"], right["mean"], right["sd"]) == (2, 4.0, 0.0)
+    assert (*left.means, left.means.cv_pct) == (3, 2.0, 1.0, 50.0)
+    assert right.means == (2, 4.0, 0.0)
     (row,) = symmetry([left, right])
     assert row["ratio_left_to_right"] == 0.5
 

@@ -5,11 +5,13 @@ import json
 
 import numpy as np
 import pytest
+from panel.protocol import Client
 from walking import STEP, STRIDE, contacts, two_feet, write
 
 import taxel
 from taxel.cli import main
 from taxel.labels import rows_of, text_with
+from taxel.panel import Panel
 
 TABLES = ("steps.csv", "summary.csv", "symmetry.csv", "curves.csv", "report.html")
 
@@ -85,6 +87,17 @@ def test_what_is_taken_out_or_moved_stays_so(walk, tmp_path):
         left = [row for row in rows if row["foot"] == "left"]
         assert [row["step"] for row in left if row["used"] == "by hand"] == ["10"]
         assert float(left[20]["contact_s"]) == pytest.approx((moved + 30_000) / 1e6)
+
+
+def test_what_the_page_takes_out_stays_out(walk, tmp_path):
+    run(walk, "-o", tmp_path)
+    with Panel(walk, labels="steps") as panel, Client(panel) as page:
+        assert page.ask("open", name=walk.name)["type"] == "done"
+        contacts_right = [row for row in page.labels() if (row["label"], row["source"]) == ("contact", "right")]
+        assert page.remove(contacts_right[3])["type"] == "done"
+    run(walk, "-o", tmp_path, "--overwrite")
+    _, rows = table(tmp_path / "steps.csv")
+    assert [(row["foot"], row["step"]) for row in rows if row["used"] == "by hand"] == [("right", "4")]
 
 
 def test_a_cohort_by_names_with_weights_and_conditions(tmp_path):

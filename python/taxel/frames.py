@@ -289,6 +289,10 @@ class Frames(FrozenColumns):
     def maximum(self) -> NDArray[np.float32]:
         """Return the largest value of each taxel, shape (rows, columns): the maximum picture; NaN without a value.
 
+        Raises
+        ------
+        ProblemError : no frame
+
         Examples
         --------
         >>> Frames([[[1.0, 2.0]], [[3.0, 0.0]]], [0, 100]).maximum()

@@ -46,6 +46,17 @@ def held(table: Path) -> Counter:
     return Counter((row.text, row.t) for row in taxel.Labels(table).rows)
 
 
+def test_the_tables_of_another_word_are_shown_and_changed(walk, table):
+    steps = walk.with_suffix(".steps.csv")
+    steps.write_text("t_us,label,found_us\n5,contact,4\n9,lift,9\n")
+    with Panel(walk, labels="steps") as panel, Client(panel) as here:
+        assert opened(here) == [("contact", 5), ("lift", 9)]
+        here.remove(here.labels()[1])
+        here.alter(here.labels()[0], t_us=6)
+    assert steps.read_text() == "t_us,label,found_us\n6,contact,4\n"
+    assert not table.exists()
+
+
 def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change_what_is_gone(walk, table):
     with Panel(walk) as one, Panel(walk) as other, Client(one) as here, Client(other) as there:
         opened(here)

@@ -38,6 +38,7 @@ def view(
     /,
     *,
     calibration: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    labels: Annotated[str, Parameter(metavar="WORD")] = "notes",
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,
     opens: OpenOption = True,
@@ -60,10 +61,12 @@ def view(
         The page can open the other files of the folder.
     calibration
         Show frames in N or kPa by this calibration (taxel calibrate). Default: the calibration beside the recording.
+    labels
+        Show and change the labels of NAME.WORD.csv; steps: those that taxel steps wrote.
     """
     console = Console(stderr=True, quiet=as_json)
     opening = _opening(reading, calibration, recording)
-    shown = Panel(recording, host=panel_host, port=panel_port, opens=opening, options=reading)
+    shown = Panel(recording, host=panel_host, port=panel_port, opens=opening, options=reading, labels=labels)
     # Ctrl-C is the end that is awaited from the moment on at which the address is known.
     with shown as panel, contextlib.suppress(KeyboardInterrupt):
         if as_json:

@@ -79,6 +79,8 @@ class Hub:
         The board's serial line, which `close` closes.
     asked : bool
         Whether `opened` is opened by `opening` also if it is a board's.
+    tables : str
+        The end of the names of the tables of labels.
     """
 
     def __init__(
@@ -91,6 +93,7 @@ class Hub:
         cable: Cable | None,
         *,
         asked: bool,
+        tables: str,
     ) -> None:
         self.sessions: list[Client] = []
         #: Requests that are carried out beside others.
@@ -98,7 +101,7 @@ class Hub:
         self.opened, self.registers_stated = opened, registers_stated
         self.recorder: Recorder = Recorder(self)
         self.folder = Folder(folder, opening, opened if asked else None, lambda: self.recorder.runs)
-        self.labels = LabelTables(self.folder, opening)
+        self.labels = LabelTables(self.folder, opening, tables)
         self.training = Training(opening, self.folder.files)
         self.board, self._on_board = Board(cable), asyncio.Lock()
         self.source: _core.PanelLive | None = None

@@ -33,10 +33,12 @@ class LabelTables:
     folder : Folder
     opening : Opening
         How recordings are opened.
+    tables : str
+        The end of the names of the tables: "notes" for NAME.notes.csv.
     """
 
-    def __init__(self, folder: Folder, opening: Opening) -> None:
-        self._folder, self._opening = folder, opening
+    def __init__(self, folder: Folder, opening: Opening, tables: str = "notes") -> None:
+        self._folder, self._opening, self._ending = folder, opening, f".{tables}.csv"
         self._tables: dict[str, _Table] = {}
         self._lock = asyncio.Lock()
 
@@ -51,7 +53,7 @@ class LabelTables:
         return {
             "type": "labels",
             "name": name,
-            "path": _file_of(name),
+            "path": self._file_of(name),
             "labels": [_shown(row) for row in (table.rows if table is not None else ()) if row.text],
         }
 
@@ -128,22 +130,21 @@ class LabelTables:
         return old, new
 
     def _file(self, name: str, table: _Table) -> LabelFile:
-        path = self._folder.file(_file_of(name))
+        path = self._folder.file(self._file_of(name))
         names = frozenset({"", name, Path(name).stem})
         return LabelFile(path, names, table.begin_us, table.us * self._opening.unit_us(path))
+
+    def _file_of(self, recording: str) -> str:
+        """Return the name of the file that holds the labels of a recording."""
+        return (recording.rpartition(".")[0] or recording) + self._ending
 
     def _stamp(self, name: str) -> tuple[int, int] | None:
         """Return what changes with a table; None where there is none."""
         try:
-            about = self._folder.file(_file_of(name)).stat()
+            about = self._folder.file(self._file_of(name)).stat()
         except OSError:
             return None
         return about.st_mtime_ns, about.st_size
-
-
-def _file_of(recording: str) -> str:
-    """Return the name of the file that holds the labels of a recording."""
-    return f"{recording.rpartition('.')[0] or recording}.notes.csv"
 
 
 def _shown(row: Note) -> dict[str, Any]:

@@ -50,6 +50,9 @@ class Panel:
     options : taxel.options.FullReading, optional
         Facts that the files do not hold; the page uses them for training too. If `rate_hz` gives the times of frames,
         labels are saved as numbers of frames.
+    labels : str
+        The end of the names of the tables of labels that the page shows and changes: "notes" for NAME.notes.csv,
+        "steps" for those that ``taxel steps`` wrote.
 
     Raises
     ------
@@ -73,6 +76,7 @@ class Panel:
         host: str = "127.0.0.1",
         opens: Callable[[Path], Sequence[Recording]] | None = None,
         options: FullReading | None = None,
+        labels: str = "notes",
     ) -> None:
         live = shows if isinstance(shows, Live) else None
         opened, shown = None, None
@@ -89,12 +93,14 @@ class Panel:
         if how.rate_hz is not None:
             period_us("rate_hz", how.rate_hz)
         opening = Opening() if opens is None else Opening(callback("opens", opens), shown, how)
+        if not text("labels", labels).isidentifier():
+            raise refused("labels", f" is {labels!r}: must be a word, for example steps for NAME.steps.csv")
         address = text("host", host), integer("port", port, 0, 65_535)
         place = Path.cwd() if folder is None else Path(checked_path("folder", folder)).resolve(strict=True)
         cable = None if control is None else Cable(text("control", control))
         stated = live is not None and live._registers_stated
         try:
-            self._hub = Hub(live, stated, place, opened, opening, cable, asked=opens is not None)
+            self._hub = Hub(live, stated, place, opened, opening, cable, asked=opens is not None, tables=labels)
             self._server = Server(self._hub, *address)
         except BaseException:
             if cable is not None:

@@ -1,0 +1,188 @@
+"""``taxel footprint`` as a user calls it."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from drawn import drawn
+from walking import published, two_feet, write
+
+import taxel
+from taxel.cli import main
+from taxel_gait.footprints import INSOLES
+
+TABLES = ("footprints.csv", "regions.csv", "summary.csv", "symmetry.csv", "curves.csv", "report.html")
+
+
+def run(*words):
+    """Return the exit code of a command."""
+    try:
+        main(["footprint", *map(str, words)])
+    except SystemExit as ended:
+        return ended.code
+    return 0
+
+
+def table(path):
+    lines = path.read_text().splitlines()
+    about = [line for line in lines if line.startswith("#")]
+    return about, list(csv.DictReader(lines[len(about) :]))
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory):
+    """Two people, each with both feet, twice."""
+    folder = tmp_path_factory.mktemp("plate")
+    for k, person in enumerate(("anna", "bo")):
+        (folder / person).mkdir()
+        for j, left in enumerate((False, True, False, True)):
+            frames, _ = drawn(angle=10 * k + 5 * j, left=left, noise=0.01, seed=j)
+            taxel.convert(frames, folder / person / f"{j}.npz")
+    (folder / "people.csv").write_text("person,weight_kg\nanna,60\nbo,80\n")
+    return folder
+
+
+def test_a_folder_of_prints_gives_tables_masks_and_a_page(plate, tmp_path):
+    assert run(plate, "-o", tmp_path / "out") == 0
+    masks = {f"{person}-{side}.nine.regions.json" for person in ("anna", "bo") for side in ("left", "right")}
+    assert {file.name for file in (tmp_path / "out").iterdir()} == {*TABLES, *masks}
+    _, prints = table(tmp_path / "out" / "footprints.csv")
+    assert [row["used"] for row in prints] == ["yes"] * 8
+    assert [row["foot"] for row in prints] == ["right", "left"] * 4
+    _, regions = table(tmp_path / "out" / "regions.csv")
+    assert len(regions) == 8 * 9
+    own = [row for row in regions if row["recording"] == "anna/0"]
+    assert sum(float(row["impulse_share_pct"]) for row in own) == pytest.approx(100)
+    _, summed = table(tmp_path / "out" / "summary.csv")
+    heel = next(
+        row
+        for row in summed
+        if (row["person"], row["foot"], row["region"], row["measure"]) == ("bo", "left", "heel", "max_force_N")
+    )
+    assert int(heel["n"]) == 2
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "left: 2 in means" in page
+    assert "right: 2 in means" in page
+
+
+def test_wide_has_a_row_a_print(plate, tmp_path):
+    run(plate, "-o", tmp_path / "out", "--wide", "--mask", "thirds")
+    _, rows = table(tmp_path / "out" / "regions.csv")
+    assert len(rows) == 8
+    assert all(float(row["rearfoot max_force_N"]) > 0 for row in rows)
+
+
+def test_a_mask_that_a_person_changed_is_used_in_the_next_run(plate, tmp_path):
+    out = tmp_path / "out"
+    run(plate, "-o", out, "--mask", "thirds")
+    file = out / "anna-left.thirds.regions.json"
+    stated = json.loads(file.read_text())
+    stated["regions"] = [one for one in stated["regions"] if one["name"] == "rearfoot"]
+    stated["regions"][0]["polygon"] = [[-80, -80], [80, -80], [80, 40], [-80, 40]]
+    file.write_text(json.dumps(stated))
+    run(plate, "-o", out, "--mask", "thirds", "--overwrite")
+    about, rows = table(out / "regions.csv")
+    assert any(file.name in line for line in about)
+    own = [row for row in rows if row["recording"].startswith("anna") and row["foot"] == "left"]
+    assert [row["region"] for row in own] == ["rearfoot", "rearfoot"]
+
+
+def test_prints_that_are_partial_are_named_and_have_no_regions(tmp_path, capsys):
+    taxel.convert(drawn()[0], tmp_path / "whole.npz")
+    taxel.convert(drawn(cut=(0.35, 2))[0], tmp_path / "part.npz")
+    (tmp_path / "people.csv").write_text("person,recording\nanna,*\n")
+    assert run(tmp_path, "-o", tmp_path / "out") == 0
+    _, prints = table(tmp_path / "out" / "footprints.csv")
+    used = {row["recording"]: row["used"] for row in prints}
+    assert used["whole"] == "yes"
+    assert used["part"].startswith("partial")
+    _, regions = table(tmp_path / "out" / "regions.csv")
+    assert {row["recording"] for row in regions} == {"whole"}
+    assert "partial" in capsys.readouterr().out
+
+
+def test_a_footprint_without_toes_has_empty_cells(tmp_path):
+    frames, _ = drawn(cut=(-1, 0.82))
+    taxel.convert(frames, tmp_path / "a.npz")
+    run(tmp_path / "a.npz", "-o", tmp_path / "out")
+    _, prints = table(tmp_path / "out" / "footprints.csv")
+    assert len(prints) == 1
+
+
+def test_steps_of_an_insole_of_a_grid_are_prints(tmp_path):
+    frames, _ = drawn(10.0)
+    # Nine stances of 0.51 s, 0.49 s apart.
+    still = np.zeros((49, *frames.values.shape[1:]), np.float32)
+    values = np.concatenate([still, *[frames.values, still] * 9])
+    times = np.arange(len(values)) * 10_000
+    taxel.convert(taxel.Frames(values, times, unit="kPa", array=frames.array), tmp_path / "walk.npz")
+    run(tmp_path / "walk.npz", "-o", tmp_path / "out")
+    _, prints = table(tmp_path / "out" / "footprints.csv")
+    assert len(prints) == 9
+    assert [row["used"] for row in prints] == ["first", *["yes"] * 7, "last"]
+
+
+@pytest.mark.parametrize(("name", "regions"), [("gaitpdb", 4), ("pedar", 9), ("moticon", 4)])
+def test_each_sensor_of_an_insole_is_in_one_region(name, regions):
+    file = INSOLES / f"{name}.regions.json"
+    taxels = [taxel_ for region in taxel.read_regions(file) for taxel_ in region.taxels]
+    assert len(taxel.read_regions(file)) == regions
+    assert sorted(taxels) == [(k, 0) for k in range({"gaitpdb": 8, "pedar": 99, "moticon": 16}[name])]
+
+
+def test_steps_of_an_insole_of_few_sensors_have_the_regions_of_a_file(tmp_path):
+    write(tmp_path / "GaCo01_01.txt", *two_feet(20.0))
+    assert run(tmp_path / "GaCo01_01.txt", "-o", tmp_path / "out") == 0
+    about, rows = table(tmp_path / "out" / "regions.csv")
+    assert any("gaitpdb.regions.json" in line for line in about)
+    used = [row for row in rows if row["used"] == "yes"]
+    # Sensors 1 to 3 carry 0.2, 0.1 and 0.1 of the load.
+    heel = [float(row["impulse_share_pct"]) for row in used if row["region"] == "heel"]
+    assert heel == pytest.approx([40] * len(heel), abs=0.1)
+    assert {float(row["max_force_N"]) for row in used if row["region"] == "toes"} == {80.0}
+    assert not any(name.startswith("contact_area") for name in rows[0])
+
+
+def test_an_insole_whose_sensors_nobody_states_is_refused(tmp_path, capsys):
+    values = np.abs(np.sin(np.arange(900) / 20))[:, None, None] * np.ones((1, 1, 5))
+    taxel.convert(taxel.Frames(values, np.arange(900) * 10_000, unit="N"), tmp_path / "five.npz")
+    assert run(tmp_path / "five.npz", "-o", tmp_path / "out") == 2
+    assert "--sensors FILE" in capsys.readouterr().err
+
+
+def test_places_of_moticon_give_the_centre_that_its_files_state():
+    from pandas import read_csv
+
+    stated = json.loads((INSOLES / "moticon.regions.json").read_text())
+    for path in sorted(published("insole_moticon").glob("*.txt")):
+        names = next(line for line in path.read_text("utf-8").splitlines()[::-1] if line.startswith("#"))
+        columns = names.lstrip("# ").split("\t")
+        rows = read_csv(path, sep="\t", comment="#", header=None, names=columns)
+        for foot in ("left", "right"):
+            pressures = rows[[name for name in columns if name.startswith(f"{foot} pressure")]].to_numpy()
+            centre = rows[[name for name in columns if name.startswith(f"{foot} center")]].to_numpy()
+            loaded = rows[f"{foot} total force[N]"].to_numpy() > 200
+            found = pressures @ np.array(stated["places"]) / pressures.sum(axis=1, keepdims=True)
+            assert np.nanstd((found - centre)[loaded], axis=0) == pytest.approx([0, 0], abs=0.02)
+
+
+def test_where_no_print_is_whole_the_page_says_so(tmp_path):
+    taxel.convert(drawn(cut=(0.35, 2))[0], tmp_path / "part.npz")
+    assert run(tmp_path / "part.npz", "-o", tmp_path / "out") == 0
+    assert "no footprint is in means" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_file_that_holds_no_print_is_one_line(tmp_path, capsys):
+    taxel.convert(taxel.Frames(np.ones((5, 4, 4)), np.arange(5) * 1000, unit="kPa"), tmp_path / "no_pitch.npz")
+    assert run(tmp_path / "no_pitch.npz", "-o", tmp_path / "out") == 2
+    said = [line for line in capsys.readouterr().err.splitlines() if "no footprint was found" not in line]
+    assert len(said) == 1
+    assert "pitch" in said[0]
+
+
+@pytest.mark.parametrize("words", [["--mask", "ten"], ["--side", "both"], ["--definition", "x"], ["--above", "-1"]])
+def test_what_cannot_be_is_one_line(tmp_path, capsys, words):
+    taxel.convert(drawn(10.0)[0], tmp_path / "a.npz")
+    assert run(tmp_path / "a.npz", *words, "-o", tmp_path / "out") == 2
+    assert capsys.readouterr().err.count("\n") == 1
