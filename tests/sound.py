@@ -194,6 +194,7 @@ VALUES: dict[str, Callable[[], Any]] = {
     "known": lambda: [2],
     "label": lambda: "a",
     "labels": lambda: LETTERS,
+    "level": lambda: 2,
     "levels": lambda: [0.5],
     "line_v": lambda: [1.4, 1.5, 2.0, 2.5],
     "load": lambda: 9.0,

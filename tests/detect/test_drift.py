@@ -42,8 +42,8 @@ def test_a_readout_keeps_its_training_and_the_report_draws_both(tmp_path: Path, 
     readout = load(training.readout.save(tmp_path / "r.json"))
     data = readout._parts["training"]
     assert set(data["error_ms"]) == {"contact", "lift"}
-    assert data["loads"]["peak"]["count"] == 25
-    assert np.all(np.diff(data["loads"]["peak"]["values"]) >= 0)
+    assert data["loads"]["sum"]["count"] == 25
+    assert np.all(np.diff(data["loads"]["sum"]["values"]) >= 0)
     rows = "".join(f"{label},{t}\n" for label, times in labels.items() for t in times)
     (tmp_path / "a.csv").write_text(f"label,t_us\n{rows}")
     arguments = ("detect", tmp_path / "a.npz", "--readout", tmp_path / "r.json", "--truth", tmp_path / "a.csv")

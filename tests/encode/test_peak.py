@@ -72,6 +72,6 @@ def test_the_peak_is_numpys(seed, shape, noise, loaded):
     levels = ((steps[apart] + steps[apart + 1]) / 2).tolist()
     spikes = Peak(levels=levels, release=1.0, tare=tare).encode(Frames(frames, t, array=array))
     for level, rises, falls in zip(levels, spikes, list(spikes)[len(levels) :], strict=False):
-        moves = np.diff(np.concatenate([[0], wanted >= level]).astype(int))
+        moves = np.diff((wanted >= level).astype(int), prepend=int(wanted[0] >= level))
         assert np.rint(rises * 1000).astype(int).tolist() == t[moves == 1].tolist()
         assert np.rint(falls * 1000).astype(int).tolist() == t[moves == -1].tolist()

@@ -8,6 +8,7 @@ use taxel_core::detect::{
     ReadoutStream as CoreStream, Reference, Spread, score as score_core,
 };
 use taxel_core::encode::{Quantity, Tare, Zeroing};
+use taxel_core::metrics::matching::in_order;
 use taxel_core::spikes::us;
 
 use taxel_border::convert::{ArrayIn, Column, EventsIn, FramesIn, array, column, slice};
@@ -117,6 +118,20 @@ pub fn score(
             }
         })
         .collect())
+}
+
+/// The places of detections and of the reference events of one label that are paired, each time ascending, us.
+#[pyfunction]
+pub fn pairs<'py>(
+    py: Python<'py>,
+    t: PyReadonlyArray1<'py, i64>,
+    events: PyReadonlyArray1<'py, i64>,
+    window_us: i64,
+) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>)> {
+    let (t, events) = (slice("t", &t)?, slice("events", &events)?);
+    let found = enter(py, |stop| in_order(t, events, &vec![window_us; events.len()], stop))?;
+    let column = |of: fn(&(usize, usize)) -> usize| array(py, found.iter().map(|pair| of(pair) as i64).collect());
+    Ok((column(|pair| pair.0), column(|pair| pair.1)))
 }
 
 /// Mean, standard deviation, median, 2.5th and 97.5th percentile.
@@ -332,13 +347,12 @@ impl LoadCurve {
     fn edges<'py>(
         &self,
         py: Python<'py>,
-        threshold: f64,
+        level: f64,
         release: f64,
-        frames: u32,
-        dated_at: Option<f64>,
-        of_largest: bool,
+        quiet_ms: f64,
+        date: Option<f64>,
     ) -> PyResult<(DecisionsOut<'py>, DecisionsOut<'py>)> {
-        let edges = EdgeNumbers { threshold, release, frames, dated_at, of_largest };
+        let edges = EdgeNumbers { level, release, quiet_ms, date };
         let found = enter(py, |_| Ok::<_, taxel_core::Error>(self.0.edges(&edges)))?;
         let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|decision| decision.label == 0);
         Ok((from_decisions(py, &begins), from_decisions(py, &ends)))

@@ -38,7 +38,7 @@ def of_loads(examples: Sequence[Example], noise_floor: float) -> dict[str, _Valu
     Returns
     -------
     mapping of str to float64, shape (values,)
-        ``sum`` above rest, in the sensor's unit; ``peak`` above rest, in noises; ``taxels`` that are loaded;
+        ``sum`` above rest, in the sensor's unit; ``taxels`` that are loaded;
         ``lasts_ms``; ``apart_ms``, from begin to begin.
     """
     found = touches(examples, noise_floor)
@@ -49,8 +49,10 @@ def of_loads(examples: Sequence[Example], noise_floor: float) -> dict[str, _Valu
     for k in range(len(examples)):
         here = loads.windows([(k, -np.inf, np.inf)])
         begins, ends = (np.sort(edge.between(here).t) for edge in edges)
-        begins = begins[: len(ends)]  # the last may not end
-        measured = {"peak": "peak", "sum": "total", "taxels": "area"}
+        # The first load may have begun before the recording, and the last may not end.
+        ends = ends[np.searchsorted(ends, begins[0]) :] if len(begins) else begins
+        begins = begins[: len(ends)]
+        measured = {"sum": "load", "taxels": "area"}
         of_example = {name: loads.largest(quantity, begins, ends) for name, quantity in measured.items()}
         of_example |= {"lasts_ms": (ends[: len(begins)] - begins) / 1e3, "apart_ms": np.diff(begins) / 1e3}
         for name, values in of_example.items():

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 _MOST, _FAR_MS = 4, 2000.0
 #: What is measured of loads, with the sensor's unit.
 _NAMES = {
-    "peak": "peak, times the noise",
     "sum": "sum, {}",
     "taxels": "loaded taxels",
     "lasts_ms": "lasts, ms",

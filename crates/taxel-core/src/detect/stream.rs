@@ -62,8 +62,8 @@ pub(super) struct Way {
 #[derive(Clone)]
 enum Decides {
     Neurons(DelayedNeurons),
-    /// A plain rule, for which they are changes of its quantities, with its labels.
-    Rule(Box<RunningRule>, [Option<String>; 2]),
+    /// A plain rule, for which they are changes of its quantities, with its labels, and its constant, us.
+    Rule(Box<RunningRule>, [Option<String>; 2], i64),
 }
 
 impl Way {
@@ -73,8 +73,13 @@ impl Way {
     }
 
     /// That of a plain rule: `loads` emits the changes of its quantities.
-    pub(super) fn of_rule(loads: Box<dyn Stream>, rule: RunningRule, labels: [Option<String>; 2]) -> Self {
-        Self::new(loads, Decides::Rule(Box::new(rule), labels))
+    pub(super) fn of_rule(
+        loads: Box<dyn Stream>,
+        rule: RunningRule,
+        labels: [Option<String>; 2],
+        constant: i64,
+    ) -> Self {
+        Self::new(loads, Decides::Rule(Box::new(rule), labels, constant))
     }
 
     fn new(encoder: Box<dyn Stream>, decides: Decides) -> Self {
@@ -98,11 +103,12 @@ impl Way {
                 neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
                 neurons.settle(ms(until), clock, begin, out)?;
             }
-            Decides::Rule(rule, labels) => {
+            Decides::Rule(rule, labels, constant) => {
                 let mut decisions = vec![];
                 spikes.for_each(|(change, repaired)| rule.change(change, repaired, clock, &mut decisions));
                 rule.advance(until, clock, &mut decisions);
                 out.extend(decisions.into_iter().filter_map(|Decision { label, t, known, repaired, .. }| {
+                    let t = t - *constant;
                     let label = labels[label].clone().filter(|_| t >= begin)?;
                     // A rule has no potential, hence no slope.
                     Some(Detection { label, t, known, slope: f64::NAN, repaired })
