@@ -40,7 +40,7 @@ pub(super) enum Feature {
 impl Feature {
     /// Whether it changes while the values hold.
     fn drifts(&self) -> bool {
-        matches!(self, Self::Local(_) | Self::Peak(_) | Self::Moved(_))
+        matches!(self, Self::Local(_) | Self::Moved(_))
     }
 
     /// Appends its values.
@@ -60,7 +60,7 @@ impl Feature {
                 });
             }
             Self::Range(range) => values.push(range.take(now)),
-            Self::Peak(peak) => values.push(peak.take(now.t, now.held.as_flattened())),
+            Self::Peak(peak) => values.push(peak.take(now.held.as_flattened())),
             Self::Count(count) => values.push(count.take(now) as f64),
             Self::Begin(begin) => values.push(begin.take(now) as f64),
         }
