@@ -261,6 +261,7 @@ VALUES: dict[str, Callable[[], Any]] = {
     "waves": lambda: [0.1],
     "weights": lambda: [1.0, 1.0],
     "window_ms": lambda: 0.1,
+    "absorb_s": lambda: None,
     "words": lambda: list(REGISTERS.words),
     "x": lambda: FRAMES,
     "y": lambda: [1],

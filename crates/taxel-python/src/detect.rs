@@ -9,6 +9,7 @@ use taxel_core::detect::{
 };
 use taxel_core::encode::{Quantity, Tare, Zeroing};
 use taxel_core::metrics::matching::in_order;
+use taxel_core::rest::{Following, LeftFloor};
 use taxel_core::spikes::us;
 
 use taxel_border::convert::{ArrayIn, Column, EventsIn, FramesIn, array, column, slice};
@@ -210,7 +211,37 @@ pub fn readout_run_events<'py>(
     Ok(from_detections(py, found))
 }
 
-/// The detections of a readout or a plain rule in a whole recording of frames, with its zeroings.
+/// Since when what is at rest is outside its noise floor, us, and how many taxels are at most.
+type LeftFloorOut = Option<(i64, usize)>;
+
+fn left_floor(left: Option<LeftFloor>) -> LeftFloorOut {
+    left.map(|LeftFloor { since_us, taxels }| (since_us, taxels))
+}
+
+/// Frames less what the rest of each taxel moved since the tare: the values of all, frame by frame.
+#[pyfunction]
+pub fn follow_rest<'py>(
+    py: Python<'py>,
+    frames: FramesIn<'py>,
+    tare: &str,
+    noise_floor: f64,
+    absorb_s: f64,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let (frames, tare) = (frames.view()?, Tare::from_json(tare).map_err(core)?);
+    let followed = |stop: Stop<'_>| {
+        let mut rest = tare.followed(frames.array, Following { noise_floor, absorb_s })?;
+        let mut values = Vec::with_capacity(frames.values.len());
+        for (t, frame) in frames.iter() {
+            stop.check()?;
+            values.extend_from_slice(rest.take(t, frame));
+        }
+        Ok::<_, taxel_core::Error>(values)
+    };
+    Ok(array(py, enter(py, followed)?))
+}
+
+/// The detections of a readout or a plain rule in a whole recording of frames, with its zeroings, and since when what is at
+/// rest is outside its noise floor.
 #[pyfunction]
 pub fn readout_run_frames<'py>(
     py: Python<'py>,
@@ -220,11 +251,12 @@ pub fn readout_run_frames<'py>(
     tare: Option<&str>,
     zeroings: ZeroingsIn,
     begin: Option<i64>,
-) -> PyResult<DetectionsOut<'py>> {
+) -> PyResult<(DetectionsOut<'py>, LeftFloorOut)> {
     let (readout, tare) = parse(readout, tare)?;
     let (frames, zeroings) = (frames.view()?, to_zeroings(zeroings));
     let run = |stop: Stop<'_>| readout.run_frames(frames, frame_us, tare.as_ref(), &zeroings, begin, stop);
-    Ok(from_detections(py, enter(py, run)?))
+    let (found, left) = enter(py, run)?;
+    Ok((from_detections(py, found), left_floor(left)))
 }
 
 /// The ends of the frames in which times (ms, ascending) lie, us: of those of an input of frames, or of the board's.

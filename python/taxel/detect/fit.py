@@ -24,6 +24,7 @@ from taxel.detect.ages import in_frames
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.board import noise_floor
 from taxel.detect.detector import raised
+from taxel.detect.drift import followed, rest_of
 from taxel.detect.examples import Example, array_of, check_examples, frame_ms, name_of, sizes_of, unit_of
 from taxel.detect.fitted_point import FittedPoint, Inputs
 from taxel.detect.floors import floor_alone, floor_of
@@ -160,6 +161,8 @@ class Fitter:
         Of scores.
     frame_us : float, us, optional
         As in `taxel.detect.run`.
+    absorb_s : float, s, optional
+        After how long a load that stays is rest, in frames; 0: the rest stays. Default: `taxel.detect.drift.rest_of`.
     progress : function of (step, done, all), optional
 
     Raises
@@ -174,22 +177,29 @@ class Fitter:
         *,
         window_ms: float = 50.0,
         frame_us: float | None = None,
+        absorb_s: float | None = None,
         progress: Progress | None = None,
     ) -> None:
         if frame_us is not None:
             finite("frame_us", frame_us, least=1.0, most=3.6e9)
         clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
-        self.examples, self.clocks = check_examples(examples), clocks
+        checked, self.clocks = check_examples(examples), clocks
+        of_board = max(noise_floor(example[0]) for example in examples)
+        #: By which loads are measured, in the sensor's unit.
+        self.noise_floor = max(floor_of(checked), of_board)
+        self._rest = rest_of(checked, self.noise_floor, absorb_s)
+        self.examples = [followed(example, self._rest) for example in checked]
         self.window_ms = finite("window_ms", window_ms, least=0.0, most=3.6e6)
         self.report = reporting(progress)
         #: Makes the same fitter in another process, where nobody is told of its progress.
-        self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us)
+        self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us, absorb_s=absorb_s)
         #: All of the examples.
         self.whole = whole(self.examples)
-        of_board = max(noise_floor(example[0]) for example in examples)
         recipe = _above(instance("recipe", recipe, Recipe), of_board)
         self._in_frames = in_frames(recipe, self.examples, clocks)
         self._recipe = _possible(self._in_frames, self.examples)
+        if self._rest is not None and self._rest["absorb_s"]:
+            self._recipe = replace(self._recipe, encoder=_from_tare(self._recipe.encoder))
         self.array, self._unit = array_of(self.examples), unit_of(self.examples)
         self._pads = len(sizes_of(examples)) > 0
         self.labels = _labels_to_learn(self.examples, recipe)
@@ -197,7 +207,7 @@ class Fitter:
         self.lacks = lacks(self.examples)
         self._tuning: Tuning | None = None
         if not self.lacks:
-            loads = Loads(self.examples, clocks, max(floor_of(self.examples), of_board), self.report)
+            loads = Loads(self.examples, clocks, self.noise_floor, self.report)
             self._tuning = Tuning(loads, self.labels, self.window_ms)
         # The quantity whose thresholds the labels are.
         self._own = min((example.labels_of for example in self.examples if example.labels_of), default=None)
@@ -230,7 +240,7 @@ class Fitter:
         plan = replace(plan, neurons=points)
         known = {label: rule for label, rule in rules.items() if rule is not None}
         readout = _readout_of(learners, delays, plan, array=self.array, unit=self._unit, rules=known)
-        return Trained(plan, learners, readout._with(pads=True) if self._pads else readout, alignments)
+        return Trained(plan, learners, readout._with(pads=self._pads, rest=self._rest), alignments)
 
     def _silent(self, label: str) -> TrainedNeuron:
         """Return a neuron that never fires."""
@@ -522,6 +532,16 @@ def _above(recipe: Recipe, noise_floor: float) -> Recipe:
     parts = json.loads(recipe.encoder.to_json())
     above = raised(parts, noise_floor)
     return recipe if above == parts else replace(recipe, encoder=Encoder.from_json(parameters(above)))
+
+
+def _from_tare(encoder: Encoder) -> Encoder:
+    """Return an encoder whose local loads are from the tare, where the rest of all that is read follows.
+
+    Their own rest, which follows what is far in 20 s, swallows presses of half a minute (fingers: 154 of 550).
+    """
+    if isinstance(encoder, Composite):
+        return Composite({name: _from_tare(part) for name, part in encoder.parts.items()})
+    return copy(encoder).set_params(rest="tare") if isinstance(encoder, LocalLoad) else encoder
 
 
 def _possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:

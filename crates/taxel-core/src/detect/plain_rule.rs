@@ -8,6 +8,7 @@ use crate::detect::running_rule::{EdgeNumbers, Limits, RunningRule};
 use crate::detect::stream::Way;
 use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainingData, file};
 use crate::encode::{Quantity, Tare};
+use crate::rest::Following;
 use crate::spikes::us;
 use crate::{Array, Result, problem, reading};
 
@@ -80,6 +81,9 @@ pub struct PlainRule {
     /// The taxels' rest. It is valid for one board on one day: a saved rule has none and receives one when it is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
+    /// How the rest of frames follows; `None`: it stays as it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<Following>,
     /// What the data of the training were like; `None` if it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training: Option<TrainingData>,
@@ -142,6 +146,7 @@ impl PlainRule {
             _ => {}
         }
         self.training.as_ref().map_or(Ok(()), TrainingData::check)?;
+        self.rest.as_ref().map_or(Ok(()), Following::check)?;
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 
@@ -165,7 +170,9 @@ impl PlainRule {
     /// `Problem` if a part is not valid, if there is no tare or one of another array, or if the period is not valid.
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         let way = self.way(array, tare)?;
-        Ok(ReadoutStream::new(vec![way], array.clone(), FrameClock::new(frames)?))
+        let tare = tare.or(self.tare.as_ref());
+        let rest = self.rest.zip(tare).map(|(following, tare)| tare.followed(array, following)).transpose()?;
+        Ok(ReadoutStream::new(vec![way], array.clone(), FrameClock::new(frames)?, rest))
     }
 
     /// The way of its stream, for an array.

@@ -18,6 +18,7 @@ fn rule() -> PlainRule {
         noise_floor: 0.0,
         unit: Some("kPa".to_owned()),
         tare: None,
+        rest: None,
         training: None,
     }
 }
