@@ -28,7 +28,7 @@ from taxel._base.arguments import (
 from taxel._base.documents import of_toml
 from taxel._base.errors import refused
 from taxel._core import FormatError, ProblemError, encoder_names
-from taxel.tare import GivenTare, check_tare
+from taxel.tare import GivenTare, check_absorb, check_tare
 
 if TYPE_CHECKING:
     from taxel.detect import Recipe
@@ -242,6 +242,10 @@ class TrainOptions:
     tare : Tare, path or float (s), optional
         The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
         rest at the beginning of each recording. Default: its first quiet half second.
+    absorb_s : float, s, optional
+        After how many seconds a load that stays becomes rest, in frames of numbers, whose rest follows drift; 0: the
+        rest stays as it was measured. Default: 60, but 0 in units of force and pressure and for counts of events,
+        and where values fall from their rest.
     folds : int, optional
         Number of folds for scores on held-out data: folds of recordings, or of blocks of time in a single recording;
         0: score on the training data. Default: at most 5, as many as the recordings and the rarest label allow.
@@ -264,6 +268,7 @@ class TrainOptions:
     recipe: str | None = None
     changes: Settings = field(default_factory=dict)
     tare: _TypedTare = None
+    absorb_s: float | None = None
     folds: int | None = None
     window_ms: float = 50.0
     shift_ms: float = 0.0
@@ -272,6 +277,7 @@ class TrainOptions:
         """Refuse values that no recordings and labels could make valid, before these are read."""
         mapping("changes", self.changes)
         check_tare(self.tare)
+        check_absorb(self.absorb_s)
         check_shift(self.shift_ms)
         finite("window_ms", self.window_ms, least=0.0)
         if self.folds is not None and integer("folds", self.folds, 0) == 1:
@@ -300,6 +306,9 @@ class DetectOptions:
     tare : Tare, path or float (s), optional
         The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
         rest at the beginning of each recording. Default: 0 for force and pressure, else the first quiet stretch.
+    absorb_s : float, s, optional
+        After how many seconds a load that stays becomes rest, in frames of numbers, whose rest follows drift; 0: the
+        rest stays as it was measured. Default: as in the training.
     frame_us : float, us, optional
         Length of the board's frame, us. Default: from the registers or the frames, else 192.
     window_ms : float, ms
@@ -322,6 +331,7 @@ class DetectOptions:
     """
 
     tare: _TypedTare = None
+    absorb_s: float | None = None
     frame_us: float | None = None
     window_ms: float = 50.0
     shift_ms: float = 0.0
@@ -330,6 +340,7 @@ class DetectOptions:
     def __post_init__(self) -> None:
         """Refuse values that no recordings could make valid, before these are read."""
         check_tare(self.tare)
+        check_absorb(self.absorb_s)
         finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, least=1.0, most=3.6e9)
         finite("window_ms", self.window_ms, least=0.0)
         check_shift(self.shift_ms)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, integer, number, shown
+from taxel._base.arguments import finite, instance, integer, number, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
@@ -215,3 +215,9 @@ def check_tare(tare: GivenTare | None) -> None:
     seconds = None if tare is None else seconds_of(tare)
     if seconds is not None and not 0 < seconds < np.inf:
         raise refused("tare", f" is {tare}: must be seconds above 0, or a file")
+
+
+def check_absorb(absorb_s: float | None) -> None:
+    """Refuse a time after which a load is rest that is neither 0 nor a number of seconds from 1 to half an hour."""
+    if absorb_s is not None and finite("absorb_s", absorb_s, least=0.0, most=1800.0) != 0.0:
+        finite("absorb_s", absorb_s, least=1.0)

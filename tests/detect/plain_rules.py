@@ -21,24 +21,23 @@ def tare(array=ARRAY, rest=REST):
     return Tare.take(Frames(np.reshape([known, known], (2, *array.shape)), [0, 1000], array=array))
 
 
-class LocalLoad:
-    """The largest 3 x 3 sum of clipped deviations from a rest that follows each taxel, in units of its noise."""
+class Changes:
+    """What all taxels gain and lose against running means of 100 ms: the smaller, and the rise and fall of the sum."""
 
-    def __init__(self):
-        self.rest, self.above, self.t, self.waiting = np.full(ARRAY.shape, REST), np.zeros(ARRAY.shape), None, None
+    def __init__(self, name):
+        self.name, self.means, self.above, self.t, self.waiting = name, None, np.zeros(ARRAY.shape), None, None
 
     def at(self, t, held):
-        # The noise of `tare` is 0, so a taxel's is the least, 0.3; s is that with half the floor.
-        s, far = math.hypot(0.3, FLOOR / 2), max(FLOOR + 0.5, 5 * 0.3)
         self.waiting = held == 0 if self.waiting is None else self.waiting & (held == 0)
+        values = np.where(self.waiting, REST, held)
+        self.means = values if self.means is None else self.means
         passed = 0 if self.t is None else t - self.t
-        tau = np.where(np.abs(self.above) < far, 1e6, 20e6)
-        self.rest = self.rest - np.expm1(-passed / tau) * self.above
-        self.t, self.above = t, np.where(self.waiting, self.rest, held) - self.rest
-        around = np.pad([np.clip(self.above, -3 * s, 3 * s), np.full(ARRAY.shape, s**2)], [(0, 0), (1, 1), (1, 1)])
-        rows, columns = ARRAY.shape
-        sums, noise = sum(around[:, y : y + rows, x : x + columns] for y in range(3) for x in range(3))
-        return max(0.0, float((sums / np.sqrt(noise)).max()))
+        self.means = self.means - math.expm1(-passed / 1e5) * self.above
+        self.t, self.above = t, values - self.means
+        gains, losses = np.maximum(self.above, 0.0).sum(), np.maximum(-self.above, 0.0).sum()
+        return {"moved": min(gains, losses), "rise": max(gains - losses, 0.0), "fall": max(losses - gains, 0.0)}[
+            self.name
+        ]
 
 
 class Count:
@@ -75,9 +74,11 @@ def beside_loaded(held):
 
 
 def quantity(name, held):
-    """The number of loaded taxels beside a loaded one, or the sum of their values above rest."""
-    loaded = beside_loaded(held)
-    return float(loaded.sum()) if name == "area" else float(np.float32(np.maximum(held[loaded] - REST, 0.0).sum()))
+    """The number of loaded taxels beside a loaded one, or the sum of what taxels, each alone, read above rest."""
+    if name == "area":
+        return float(beside_loaded(held).sum())
+    above = np.where(held >= REST + FLOOR + 0.5, held - REST, 0.0)
+    return float(np.float32(above.sum() - (above.max() if name == "load_without_largest" else 0.0)))
 
 
 def frame_of(t, period_us, stamp_us):
@@ -92,9 +93,9 @@ class ByLoop:
     """Frames with changes, as (number, end, changes), of which each change is (time, area, quantity)."""
 
     def __init__(self, rule, source, frame_us, version=1, reach_us=0):
-        self.frames, name = {}, rule.quantity
+        self.frames, name, self.frame_us = {}, rule.quantity, Fraction(frame_us)
         of_levels = {"count": Count, "begin_area": BeginArea}
-        held, follows = np.zeros(ARRAY.shape), LocalLoad() if name == "local_load" else None
+        held, follows = np.zeros(ARRAY.shape), Changes(name) if name in CHANGES else None
         follows = of_levels[name](rule.levels) if name in of_levels else follows
 
         def measured(t, held):
@@ -117,7 +118,7 @@ class ByLoop:
             self.frames.setdefault(frame_of(now, period, stamp), []).append(measured(now, held))
             # What a rest that follows changes is computed between stamps too.
             again = now + 10_000
-            while name == "local_load" and again < following:
+            while name in CHANGES and again < following:
                 self.frames.setdefault(frame_of(again, period, stamp), []).append(measured(again, held))
                 again += max(10_000, (again - now) // 8)
         self.end = lambda k: math.ceil((k + 1) * period)
@@ -128,52 +129,47 @@ class ByLoop:
         """Until when a recording is continued."""
         return int(source.t.max()) + 1_000_000 + math.ceil(reach_us)
 
-    def edges(self, threshold, release, frames, which=2, dated_at=None, *, of_largest=False):
+    def held_at(self, at):
+        """The frame that holds at a time, and when that is known."""
+        if not hasattr(self, "starts"):
+            return self.frame(at), self.end(self.frame(at))
+        k = max(k for k, start in enumerate(self.starts) if start <= at)
+        periods = (at - self.starts[k]) // self.frame_us + 1
+        return k, math.ceil(self.starts[k] + periods * self.frame_us)
+
+    def edges(self, level, release, quiet_ms=0.0, date=None, which=2):
         """The onsets and ends: (is end, t, known)."""
-        loaded, first, since, before, found, rest, largest = False, None, 0, 0.0, [], 0.0, 0.0
-        visited = self.frames if hasattr(self, "starts") else {
-            n + more for n in self.frames for more in range(frames + 1)
-        }  # fmt: skip
+        limits = level, release * level
+        dated = limits if date is None else (date * level, date * level)
+        # The first frame shows whether the sensor is loaded; before events it is not.
+        loaded = hasattr(self, "starts") and self.frames[0][-1][which] >= level
+        since, before, waits, found = 0, 0.0, None, []
 
-        def passes(value, *, dated=False):
-            if of_largest:
-                return value < rest + release * (largest - rest) if loaded else value >= rest + threshold
-            if dated and dated_at is not None:
-                return value < dated_at if loaded else value >= dated_at
-            return value < release * threshold if loaded else value >= threshold
+        def passes(value, limits):
+            return value < limits[1] if loaded else value >= limits[0]
 
-        for n in sorted(visited):
+        for n in [*sorted(self.frames), None]:
+            if waits is not None and (n is None or self.held_at(waits[0])[0] < n):
+                found.append((loaded, waits[1], self.held_at(waits[0])[1]))
+                loaded, waits = not loaded, None
             for change in self.frames.get(n, []):
-                passed = passes(before, dated=True)
-                before = change[which]
-                largest, rest = max(largest, before), rest if loaded else min(rest, before)
-                if passes(before, dated=True) and not passed:
+                passed, before = passes(before, dated), change[which]
+                if passes(before, dated) and not passed:
                     since = change[0]
-            if not passes(before):
-                first = None
-                continue
-            first = (n, since) if first is None else first
-            if n - first[0] + 1 == frames:
-                found.append((loaded, first[1], self.end(n)))
-                loaded, first, largest = not loaded, None, before
-                rest = rest if loaded else before
+                if not passes(before, limits):
+                    waits = None
+                elif waits is None:
+                    waits = change[0] + round(1000 * quiet_ms) * loaded, since
         return found
 
-    def kinds(self, threshold, age_us, frame_us):
+    def kinds(self, level, age_us):
         """The kind of every touch: (is above, t, known)."""
         found = []
-        for is_end, t, _ in self.edges(2.0, 1.0, 1, which=1):
-            if is_end:
-                continue
-            at = t + age_us
-            if hasattr(self, "starts"):
-                last = max(k for k, start in enumerate(self.starts) if start <= at)
-                periods = (at - self.starts[last]) // Fraction(frame_us) + 1
-                known = math.ceil(self.starts[last] + periods * Fraction(frame_us))
-            else:
-                known = self.end(last := self.frame(at))
-            value = self.frames[max(k for k in self.frames if k <= last)][-1][2]
-            found.append((value >= threshold, t, known))
+        for is_end, t, _ in self.edges(1.0, 1.0, which=1):
+            if not is_end:
+                last, known = self.held_at(t + age_us)
+                value = self.frames[max(k for k in self.frames if k <= last)][-1][2]
+                found.append((value >= level, t, known))
         return found
 
 
@@ -195,34 +191,35 @@ def events(draw):
     return Events(t, x, y, [True] * n, array=ARRAY, intensity=np.array(ticks))
 
 
-#: Local loads are compared with numbers that no sum reaches exactly, as they are computed in single precision.
-LOCAL_LOADS = st.sampled_from([0.531, 1.071, 2.133, 3.317, 4.313])
+CHANGES = ("moved", "rise", "fall")
+#: Changes are compared with numbers that no sum reaches exactly, as they are computed in single precision.
+UNREACHED = st.sampled_from([0.531, 1.071, 2.133, 3.317, 4.313])
 
 
 @st.composite
 def rules(draw):
-    """A rule of edges: of any quantity, dated at its threshold or below it, or of its largest value."""
-    name = draw(st.sampled_from(["area", "total", "local_load", "count", "begin_area"]))
-    drawn = LOCAL_LOADS if name == "local_load" else st.sampled_from([1.0, 2.0, 3.0, 3.5, 4.0, 7.25, 9.0])
-    threshold, release, how = draw(drawn), draw(st.sampled_from([0.125, 0.5, 0.75, 1.0])), {}
+    """A rule of edges: of any quantity, dated at its level or below it, with a quiet time and a constant."""
+    name = draw(st.sampled_from(["area", "load", "load_without_largest", "count", "begin_area", *CHANGES]))
+    drawn = UNREACHED if name in CHANGES else st.sampled_from([1.0, 2.0, 3.0, 3.5, 4.0, 7.25, 9.0])
+    level, release, how = draw(drawn), draw(st.sampled_from([0.125, 0.5, 0.75, 1.0])), {}
     if name == "count":
         how["levels"] = draw(st.sampled_from([[1.0], [1.75, 2.5], [0.5, 1.0, 2.0, 6.0]]))
     if name == "begin_area":
         how["levels"] = draw(st.sampled_from([[0.05], [0.192, 0.4], [0.1, 1.0, 20.0]]))
     if draw(st.booleans()):
-        how["of_largest"] = True
-    elif draw(st.booleans()):
-        part = draw(st.sampled_from([0.0, 0.3, 0.5, 1.0]))
-        how["dated_at"] = release * threshold + part * (threshold - release * threshold)
-    frames = draw(st.sampled_from([1, 1, 2, 3, 5, 20]))
-    return PlainRule(name, threshold, release, frames, **how, labels=("on", "off"), noise_floor=FLOOR)
+        how["date"] = release + draw(st.sampled_from([0.0, 0.3, 0.5, 1.0])) * (1.0 - release)
+    quiet_ms, how["constant_ms"] = (
+        draw(st.sampled_from([0.0, 0.0, 0.1, 0.192, 1.0, 40.0])),
+        draw(st.sampled_from([0.0, 0.3, -2.0])),
+    )
+    return PlainRule(name, level, release, quiet_ms, **how, labels=("on", "off"), noise_floor=FLOOR)
 
 
 kinds = st.builds(
     lambda compared, age: PlainRule(*compared, age_ms=age, labels=("small", "large"), noise_floor=FLOOR),
     st.one_of(
-        st.tuples(st.sampled_from(["area", "total"]), st.sampled_from([2.0, 3.0, 4.0, 7.25])),
-        st.tuples(st.just("local_load"), LOCAL_LOADS),
+        st.tuples(st.sampled_from(["area", "load"]), st.sampled_from([2.0, 3.0, 4.0, 7.25])),
+        st.tuples(st.sampled_from(CHANGES), UNREACHED),
     ),
     st.sampled_from([0.0, 0.1, 0.192, 0.5, 1.0, 40.0]),
 )
@@ -242,17 +239,17 @@ def in_pieces(stream, source, data):
 
 
 def expected(rule, source, frame_us, version=1):
-    reach_us = rule.frames * frame_us + 1000 * (rule.age_ms or 0)
+    reach_us = frame_us + 1000 * (rule.quiet_ms + (rule.age_ms or 0))
     loop = ByLoop(rule, source, frame_us, version, reach_us)
     if rule.age_ms is not None:
-        return loop.kinds(rule.threshold, round(rule.age_ms * 1000), frame_us)
-    how = {"dated_at": rule.dated_at, "of_largest": rule.of_largest}
-    found = loop.edges(rule.threshold, rule.release, rule.frames, **how)
-    if isinstance(source, Frames):
-        return found
-    # A frame that is not over when the recording ends decides nothing.
-    last = loop.end(loop.frame(loop.horizon(source, reach_us)) - 1)
-    return [one for one in found if one[2] <= last]
+        return loop.kinds(rule.level, round(rule.age_ms * 1000))
+    found = loop.edges(rule.level, rule.release, rule.quiet_ms, rule.date)
+    constant_us = round(1000 * rule.constant_ms)
+    if not isinstance(source, Frames):
+        # A frame that is not over when the recording ends decides nothing.
+        last = loop.end(loop.frame(loop.horizon(source, reach_us)) - 1)
+        found = [one for one in found if one[2] <= last]
+    return [(is_end, t - constant_us, known) for is_end, t, known in found]
 
 
 def played(seed, touches=12, gap_us=60_000):

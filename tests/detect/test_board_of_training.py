@@ -67,7 +67,8 @@ def walked(rate_hz: int, side: str) -> taxel.Recording:
 
 @given(st.integers(1, 1000), st.integers(1, 1000), *2 * [st.sampled_from(["", "left", "right"])])
 def test_a_readout_says_where_rate_or_side_of_frames_differ_from_those_of_the_training(then, now, side, other):
-    training = of_training([Example(walked(then, side), {})])
+    nothing = taxel.detect.score(taxel.Detections([], [], []), {})
+    training = of_training([Example(walked(then, side), {})], nothing, 1.0)
     line = other_frames(training, walked(now, other))
     assert ("frames a second" in line) == (10**6 // then > 1.1 * (10**6 // now) or 10**6 // now > 1.1 * (10**6 // then))
     assert (" side" in line) == ("" not in (side, other) and side != other)

@@ -71,7 +71,7 @@ def test_a_rule_decides_by_the_duration() -> None:
     assert rule is not None
     assert rule == rules["press"]
     assert (rule.quantity, rule.age_ms) == ("duration", "end")
-    assert 200.0 < rule.threshold < 1200.0
+    assert 200.0 < rule.level < 1200.0
     again = PlainRule.from_json(rule.to_json())
     assert again == rule
     assert score(run(again, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0

@@ -152,7 +152,7 @@ def test_folds_that_are_stated_are_those_that_are_judged() -> None:
     assert [one.to_dict() for one in by_data.scores] == [one.to_dict() for one in by_number.scores]
     assert by_data.how == "3 given folds"
     for fold, made in zip(stated, by_data.trained, strict=True):
-        alone = fit([data[part.example] for part in fold.train], recipe())
+        alone = fit([data[part.example] for part in fold.train], recipe(), window_ms=10.0)
         assert made.readout == alone
         assert set(made.learners) == {"contact", "lift"}
 

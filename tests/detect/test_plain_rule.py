@@ -17,7 +17,7 @@ def test_events_give_what_a_loop_over_frames_gives(source, rule, clock):
     frame_us, version = clock
     found = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
     assert as_tuples(found, rule) == expected(rule, source, frame_us, version)
-    assert (found.t <= found.known).all()
+    assert (found.t + round(1000 * rule.constant_ms) <= found.known).all()
     assert np.isnan(found.slope).all()
     assert not found.repaired.any()
 
@@ -47,52 +47,53 @@ def test_what_rests_on_repaired_values_is_marked():
     for marked, expected_ in (([True, False, False, False], [True, False]), ([False] * 3 + [True], [False, True])):
         events = Events(source.t, source.x, source.y, source.p, array=ARRAY, intensity=source.intensity,
                         repaired=np.array(marked))  # fmt: skip
-        for frames in (1, 5):
-            found = run(PlainRule("area", 2, frames=frames, noise_floor=FLOOR), events, tare=tare())
+        for quiet_ms in (0.0, 1.0):
+            found = run(PlainRule("area", 2, quiet_ms=quiet_ms, noise_floor=FLOOR), events, tare=tare())
             assert list(found.repaired) == expected_
 
 
-# Counts by running range
+# The first state
 
 
-def test_a_count_by_running_range_is_what_a_loop_over_frames_counts():
-    """Levels are parts of what each channel read in the last ten seconds, renewed each second; none before."""
-    draw, levels = np.random.default_rng(5), [0.1, 0.3, 0.6]
+def test_frames_that_begin_loaded_have_no_onset_and_an_end():
+    held = [9.0, 9.0, 0.0, 0.0, 9.0, 9.0]
+    frames = Frames([[[v, v]] for v in held], range(0, 60_000, 10_000), array=Array(1, 2))
+    rest = tare(Array(1, 2), 0.0)
+    for name in ("load", "area", "rise"):
+        found = run(PlainRule(name, 1, noise_floor=FLOOR), frames, tare=rest)
+        begins = [d.t for d in found if d.label == "contact"]
+        assert begins == [40_000]
+    assert [d.t for d in run(PlainRule("load", 1, noise_floor=FLOOR), frames, tare=rest)] == [20_000, 40_000]
+
+
+# The load by running range
+
+
+def test_a_load_by_running_range_is_what_a_loop_over_frames_adds():
+    """Parts of what each channel read in the last ten seconds, renewed each second; nothing is known before."""
+    draw = np.random.default_rng(5)
     t = np.cumsum(draw.choice([90_000, 100_000, 100_000, 130_000, 2_500_000], 400, p=[0.2, 0.4, 0.2, 0.19, 0.01]))
     values = np.float32(draw.normal(500 * np.sin(t / 3e5), 60)[:, None] + [0.0, 1000.0]) * np.float32([1.0, 0.2])
     frames = Frames(values[:, None, :], t, array=Array(1, 2))
-
-    def percentile(window, percent):
-        ranked, rank = np.sort(window), percent / 100.0 * (len(window) - 1)
-        below = float(ranked[int(rank)])
-        following = ranked[min(int(rank) + 1, len(ranked) - 1)]
-        return below + (float(following) - below) * (rank - int(rank))
-
-    above, renewed, ranges, counts = np.zeros((3, 2), bool), None, None, []
+    renewed, ranges, loads = None, None, []
     for k, now in enumerate(t.tolist()):
         due = int(t[0]) + 10_000_000 if renewed is None else renewed + 1_000_000
         if now >= due:
             renewed = due + (now - due) // 1_000_000 * 1_000_000
             since = -1 if ranges is None and renewed == due else renewed - 10_000_000
-            window = values[:k][t[:k] >= since]
+            window = values[:k][t[:k] >= since].astype(np.float64)
             if len(window):
-                low, high = (np.array([percentile(one, p) for one in window.T]) for p in (10.0, 95.0))
+                low, high = np.percentile(window, [10.0, 95.0], axis=0)
                 ranges = low, high - low
-        if ranges is not None:
-            on, off = (
-                np.float32([[a + part * level * span for a, span in zip(*ranges, strict=True)] for level in levels])
-                for part in (1.0, 0.7)
-            )
-            above = np.where(above, values[k] >= off, values[k] >= on)
-        counts.append(int(above.sum()))
-    assert max(counts) == 6
-    changes = [
-        (now, count) for now, count, last in zip(t.tolist(), counts, [0, *counts], strict=False) if count != last
-    ]
-    [curve] = taxel._core.LoadCurve.of_frames(["range_count"], levels, 0.0, frames, None, None)
-    assert list(zip(*(column.tolist() for column in curve.changes()), strict=True)) == changes
+        loads.append(None if ranges is None else float(np.maximum((values[k] - ranges[0]) / ranges[1], 0.0).sum()))
+    [curve] = taxel._core.LoadCurve.of_frames(["range_load"], [], 0.0, frames, None, None)
+    pairs = zip(t.tolist(), loads, [None, *loads[:-1]], strict=True)
+    times, found = (column.tolist() for column in curve.changes())
+    expected_ = [(now, load) for now, load, last in pairs if load != last]
+    assert times == [now for now, _ in expected_]
+    assert found == pytest.approx([load for _, load in expected_], rel=1e-5, abs=1e-5)
     # It needs no tare.
-    rule = PlainRule("range_count", 4, 2.5 / 4, levels=levels, dated_at=3.0)
+    rule = PlainRule("range_load", 0.8, 0.5, quiet_ms=150.0, date=0.75)
     whole, stream = run(rule, frames, frame_us=100_000.0), rule.stream(frame_us=100_000.0)
     pieces = [stream.push(frames[k : k + 7]) for k in range(0, len(t), 7)]
     assert sum(pieces[1:], pieces[0]) + stream.advance(int(t[-1]) + 2_000_000) == whole
@@ -105,7 +106,10 @@ def test_a_count_by_running_range_is_what_a_loop_over_frames_counts():
 def test_tuning_finds_a_planted_rule():
     examples = [played(seed) for seed in range(3)]
     rules = tune(examples)
-    assert (rules["hit"].quantity, rules["hit"].threshold, rules["hit"].frames) == ("area", 16.0, 1)
+    # Smaller touches of 9 taxels of 20 ticks are no hit, those of 25 are.
+    assert rules["hit"].quantity == "load_without_largest"
+    assert 160.0 < rules["hit"].level <= 480.0
+    assert rules["hit"].constant_ms == pytest.approx(0.3)
     assert repr(rules["hit"]).startswith("PlainRule(hit: ")
     assert repr(rules["gone"]).startswith("PlainRule(gone: ")
     for example_ in [played(17), *examples]:
@@ -117,19 +121,22 @@ def test_tuning_finds_a_planted_rule():
 
 def test_tuning_finds_when_a_touch_leaves_the_place_where_it_began():
     """Touches move over a plate from anywhere, equally large all the time, and leave other places as fast."""
-    draw, step, values, lifted = np.random.default_rng(3), 5_000, np.zeros((2_000, 26, 9), np.float32), []
-    for begin in range(100, 1_900, 60):
-        row, column, moves, leaves, ends = draw.integers([0, 0, 9, 28, 36], [3, 5, 13, 35, 51])
-        for k, (first, last) in enumerate(((0, leaves), (6, moves), (moves, ends), (leaves, ends))):
-            values[begin + first : begin + last, row + 6 * k : row + 6 * k + 6, column : column + 4] = 20.0
-        lifted.append((begin + leaves) * step)
-    frames = Frames(values, step * np.arange(len(values)), array=Array(26, 9))
-    example = Example(frames, {"lifted": np.array(lifted)}, taxel.Tare.take(frames, stop_us=400_000))
-    rule = tune([example], window_ms=4.0, noise_floor=FLOOR)["lifted"]
-    assert rule.quantity == "begin_area"
-    assert repr(rule).startswith("PlainRule(lifted: begin area falls to ")
-    score = taxel.detect.score(run(rule, frames, tare=example.tare), {"lifted": lifted}, 4)
-    assert (score.missed, score.false) == (0, 0)
+
+    def walked(seed):
+        draw, step, values, lifted = np.random.default_rng(seed), 5_000, np.zeros((2_000, 26, 9), np.float32), []
+        for begin in range(100, 1_900, 60):
+            row, column, moves, leaves, ends = draw.integers([0, 0, 9, 28, 36], [3, 5, 13, 35, 51])
+            for k, (first, last) in enumerate(((0, leaves), (6, moves), (moves, ends), (leaves, ends))):
+                values[begin + first : begin + last, row + 6 * k : row + 6 * k + 6, column : column + 4] = 20.0
+            lifted.append((begin + leaves) * step)
+        frames = Frames(values, step * np.arange(len(values)), array=Array(26, 9))
+        return Example(frames, {"lifted": np.array(lifted)}, taxel.Tare.take(frames, stop_us=400_000))
+
+    rule, unseen = tune([walked(3)], window_ms=4.0, noise_floor=FLOOR)["lifted"], walked(4)
+    begin_area = PlainRule("begin_area", 12, levels=[10.0], labels=(None, "lifted"), noise_floor=FLOOR)
+    for one in (rule, begin_area):
+        score = taxel.detect.score(run(one, unseen.source, tare=unseen.tare), unseen.labels, 4)
+        assert (score.missed, score.false) == (0, 0)
 
 
 def test_tuning_says_none_where_no_rule_is_better_than_nothing():
@@ -144,16 +151,19 @@ def test_tuning_says_none_where_no_rule_is_better_than_nothing():
 @pytest.mark.parametrize(
     ("arguments", "options"),
     [
-        (("area", 2, 0.5, 1, 5), {"labels": ("a", "b")}),
+        (("area", 2, 0.5, 0, 5), {"labels": ("a", "b")}),
         (("area", 2, 1, 5, 5), {"labels": ("a", "b")}),
-        (("area", 2, 1, 1, 5), {}),
+        (("area", 2, 1, 0, 5), {"labels": ("a", "b"), "date": 1.0}),
+        (("area", 2, 1, 0, 5), {}),
         (("area", 2), {"labels": (None, None)}),
         (("area", 2), {"labels": ("a", "a")}),
         (("count", 2), {}),
         (("area", 2), {"levels": [1.0]}),
         (("count", 2), {"levels": [2.0, 1.0]}),
-        (("area", 2, 0.5), {"dated_at": 2.1}),
-        (("area", 2, 0.5), {"dated_at": 1.5, "of_largest": True}),
+        (("area", 2, 0.5), {"date": 1.1}),
+        (("area", 2, 0.5), {"date": 0.4}),
+        (("area", 2), {"quiet_ms": -1.0}),
+        (("area", 2), {"constant_ms": 1e6}),
     ],
 )
 def test_what_does_not_fit_together_is_refused(arguments, options):
@@ -167,8 +177,8 @@ def test_curves_that_are_measured_at_once_are_those_measured_alone(source):
     def curves(*quantities):
         return taxel._core.LoadCurve.of_events(list(quantities), [], FLOOR, source, 192.0, 2, tare().to_json())
 
-    names = ["total", "local_load", "local_rise", "local_fall"]
+    names = ["load", "local_rise", "local_fall", "moved"]
     for name, curve in zip(names, curves(*names), strict=True):
         [alone] = curves(name)
-        for of_both in zip(curve.edges(1.0, 0.5, 1, None, False), alone.edges(1.0, 0.5, 1, None, False), strict=True):
+        for of_both in zip(curve.edges(1.0, 0.5, 1.0, None), alone.edges(1.0, 0.5, 1.0, None), strict=True):
             assert [column.tolist() for column in of_both[0]] == [column.tolist() for column in of_both[1]]

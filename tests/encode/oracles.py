@@ -143,9 +143,9 @@ def fa1(t, values, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=None, larg
     return sorted(spikes)
 
 
-def contact_area(t, frames, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
-    """Rises and falls of the area of a grid or a single taxel; `rest` is NaN where unknown."""
-    before, spikes, loaded = 0, [], np.zeros((1, 1), bool)
+def contact_area(t, frames, rest, floor=3.0, levels=(2, 4, 8, 16, 32), before=None):
+    """Rises and falls of the area of a grid or a single taxel; `rest` is NaN where unknown. The first has none."""
+    spikes, loaded = [], np.zeros((1, 1), bool)
     for at, frame in zip(t, frames, strict=True):
         above = np.nan_to_num(frame - rest, nan=-np.inf)
         if single := above.size == 1:
@@ -163,6 +163,7 @@ def contact_area(t, frames, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
             if (dy, dx) != (0, 0)
         )
         area = int((loaded & (single | (beside > 0))).sum())
+        before = area if before is None else before
         for k, level in enumerate(levels):
             if before < level <= area:
                 spikes.append((at, k, 1))

@@ -51,7 +51,7 @@ def test_contact_area_of_events_is_reckoned_once_a_stamp(seed):
         if k + 1 == len(events) or events.t[k + 1] != at:
             frames.append(held.copy())
             stamps.append(at)
-    wanted = oracles.contact_area(stamps, frames, np.full((6, 7), 55.0))
+    wanted = oracles.contact_area(stamps, frames, np.full((6, 7), 55.0), before=0)
     spikes = ContactArea(tare=rest(array)).encode(events)
     assert len(spikes) == 10
     assert spikes_of(spikes) == wanted

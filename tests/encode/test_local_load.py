@@ -185,7 +185,7 @@ def test_levels_are_crossed_where_the_largest_sums_of_numpy_cross_them(seed, loc
     expected = []
     for column, values in enumerate(graded.values(frames)[:, columns].T):
         for place, level in enumerate(levels):
-            reached, train = False, column * len(levels) + place
+            reached, train = values[0] >= level, column * len(levels) + place
             for time, value in zip(t.tolist(), values, strict=True):
                 if not reached and value >= level:
                     expected.append((time, train, 1.0))

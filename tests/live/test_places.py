@@ -115,7 +115,7 @@ def test_a_refused_source_leaves_its_place_free(tmp_path: Path, keys: str, argum
 
 
 def test_the_page_changes_readouts_and_sensors_and_the_command_goes_on(tmp_path: Path) -> None:
-    PlainRule("total", 1e6, noise_floor=3.0).save(tmp_path / "rule.json")
+    PlainRule("load", 1e6, noise_floor=3.0).save(tmp_path / "rule.json")
     with (
         sensor() as place,
         Live(sources=f"serial:{place},array=2x2") as live,
@@ -166,7 +166,7 @@ def test_a_sensor_that_is_gone_leaves_the_page_where_another_is_refused(tmp_path
 
 def test_a_readout_is_changed_without_closing_the_port(tmp_path: Path) -> None:
     """A server sees one connection, and each line that it sent is read once, whole."""
-    PlainRule("total", 1e6, noise_floor=3.0).save(tmp_path / "rule.json")
+    PlainRule("load", 1e6, noise_floor=3.0).save(tmp_path / "rule.json")
     with socket.create_server((LOOPBACK, 0)) as server:
         place = f"{LOOPBACK}:{server.getsockname()[1]}"
         connections: list[socket.socket] = []

@@ -96,7 +96,7 @@ def test_a_board_that_was_reset_is_shown_anew(live, panel):
 
 def test_a_raised_noise_floor_reaches_the_readout_and_is_told_once(tmp_path):
     rule = taxel.detect.PlainRule("area", 2, noise_floor=3.0)
-    training = {"noise_floor": 3.0, "error_ms": {}, "loads": {}, "board": summary(Registers())}
+    training = {"noise_floor": 3.0, "error_ms": {}, "board": summary(Registers())}
     rule._with(training=training).save(tmp_path / "rule.json")
     with page_of_a_board(tmp_path, wire_version=2) as (_, panel, page):
         page.until("registers", known=True)

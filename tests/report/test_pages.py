@@ -66,7 +66,6 @@ def detections(**values):
         "warnings": [],
         "printed": [],
         "nearest": [],
-        "beside_training": [],
         "worst": [],
         "first": [],
     }

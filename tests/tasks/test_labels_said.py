@@ -44,8 +44,8 @@ def test_labels_that_are_listed_twice_are_said(recording: taxel.Recording) -> No
 
 
 def test_a_training_says_where_values_fall(tmp_path: Path) -> None:
-    """Of channels a few of which rise, so that something is felt."""
-    frames, labels = pressed(1, begin_s=0.7)
+    """Of channels a few of which rise, so that something is felt; a rule finds falls, so labels are others."""
+    (frames, _), (_, labels) = pressed(1, begin_s=0.7), pressed(2, begin_s=0.7)
     values = 50.0 - (frames.values - 50.0).reshape(len(frames), 1, 36)
     values[300::230, 0, 0] += 20.0
     taxel.convert(taxel.Frames(values, frames.t, unit="counts"), tmp_path / "a.npz")

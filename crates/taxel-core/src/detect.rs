@@ -21,7 +21,7 @@ pub use running_rule::{Decision, EdgeNumbers};
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
 pub use trained::TrainedNeuron;
-pub use training_data::{Quantiles, TrainingData};
+pub use training_data::TrainingData;
 
 use serde::{Deserialize, Serialize};
 

@@ -109,6 +109,7 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
         seen: Default::default(),
+        rest: None,
         training: None,
     }
 }

@@ -158,6 +158,7 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
         seen: Default::default(),
+        rest: None,
         training: None,
     };
     let options = LiveOptions { readout: defaults::stated(&readout), ..options(&array, registers, None) };

@@ -8,6 +8,8 @@ use taxel_core::detect::{
     ReadoutStream as CoreStream, Reference, Spread, score as score_core,
 };
 use taxel_core::encode::{Quantity, Tare, Zeroing};
+use taxel_core::metrics::matching::in_order;
+use taxel_core::rest::{Following, LeftFloor};
 use taxel_core::spikes::us;
 
 use taxel_border::convert::{ArrayIn, Column, EventsIn, FramesIn, array, column, slice};
@@ -119,6 +121,20 @@ pub fn score(
         .collect())
 }
 
+/// The places of detections and of the reference events of one label that are paired, each time ascending, us.
+#[pyfunction]
+pub fn pairs<'py>(
+    py: Python<'py>,
+    t: PyReadonlyArray1<'py, i64>,
+    events: PyReadonlyArray1<'py, i64>,
+    window_us: i64,
+) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>)> {
+    let (t, events) = (slice("t", &t)?, slice("events", &events)?);
+    let found = enter(py, |stop| in_order(t, events, &vec![window_us; events.len()], stop))?;
+    let column = |of: fn(&(usize, usize)) -> usize| array(py, found.iter().map(|pair| of(pair) as i64).collect());
+    Ok((column(|pair| pair.0), column(|pair| pair.1)))
+}
+
 /// Mean, standard deviation, median, 2.5th and 97.5th percentile.
 #[pyfunction]
 pub fn spread(values: PyReadonlyArray1<'_, f64>) -> PyResult<Plain<Spread>> {
@@ -195,7 +211,37 @@ pub fn readout_run_events<'py>(
     Ok(from_detections(py, found))
 }
 
-/// The detections of a readout or a plain rule in a whole recording of frames, with its zeroings.
+/// Since when what is at rest is outside its noise floor, us, and how many taxels are at most.
+type LeftFloorOut = Option<(i64, usize)>;
+
+fn left_floor(left: Option<LeftFloor>) -> LeftFloorOut {
+    left.map(|LeftFloor { since_us, taxels }| (since_us, taxels))
+}
+
+/// Frames less what the rest of each taxel moved since the tare: the values of all, frame by frame.
+#[pyfunction]
+pub fn follow_rest<'py>(
+    py: Python<'py>,
+    frames: FramesIn<'py>,
+    tare: &str,
+    noise_floor: f64,
+    absorb_s: f64,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let (frames, tare) = (frames.view()?, Tare::from_json(tare).map_err(core)?);
+    let followed = |stop: Stop<'_>| {
+        let mut rest = tare.followed(frames.array, Following { noise_floor, absorb_s })?;
+        let mut values = Vec::with_capacity(frames.values.len());
+        for (t, frame) in frames.iter() {
+            stop.check()?;
+            values.extend_from_slice(rest.take(t, frame));
+        }
+        Ok::<_, taxel_core::Error>(values)
+    };
+    Ok(array(py, enter(py, followed)?))
+}
+
+/// The detections of a readout or a plain rule in a whole recording of frames, with its zeroings, and since when what is at
+/// rest is outside its noise floor.
 #[pyfunction]
 pub fn readout_run_frames<'py>(
     py: Python<'py>,
@@ -205,11 +251,12 @@ pub fn readout_run_frames<'py>(
     tare: Option<&str>,
     zeroings: ZeroingsIn,
     begin: Option<i64>,
-) -> PyResult<DetectionsOut<'py>> {
+) -> PyResult<(DetectionsOut<'py>, LeftFloorOut)> {
     let (readout, tare) = parse(readout, tare)?;
     let (frames, zeroings) = (frames.view()?, to_zeroings(zeroings));
     let run = |stop: Stop<'_>| readout.run_frames(frames, frame_us, tare.as_ref(), &zeroings, begin, stop);
-    Ok(from_detections(py, enter(py, run)?))
+    let (found, left) = enter(py, run)?;
+    Ok((from_detections(py, found), left_floor(left)))
 }
 
 /// The ends of the frames in which times (ms, ascending) lie, us: of those of an input of frames, or of the board's.
@@ -332,13 +379,12 @@ impl LoadCurve {
     fn edges<'py>(
         &self,
         py: Python<'py>,
-        threshold: f64,
+        level: f64,
         release: f64,
-        frames: u32,
-        dated_at: Option<f64>,
-        of_largest: bool,
+        quiet_ms: f64,
+        date: Option<f64>,
     ) -> PyResult<(DecisionsOut<'py>, DecisionsOut<'py>)> {
-        let edges = EdgeNumbers { threshold, release, frames, dated_at, of_largest };
+        let edges = EdgeNumbers { level, release, quiet_ms, date };
         let found = enter(py, |_| Ok::<_, taxel_core::Error>(self.0.edges(&edges)))?;
         let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|decision| decision.label == 0);
         Ok((from_decisions(py, &begins), from_decisions(py, &ends)))

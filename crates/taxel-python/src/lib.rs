@@ -46,8 +46,8 @@ mod _core {
     use crate::described::{check_parameters, parameters};
     #[pymodule_export]
     use crate::detect::{
-        LoadCurve, ReadoutStream, Tally, check_detections, check_plain_rule, check_readout, frame_ends, is_plain_rule,
-        make_plain_rule, make_readout, readout_run_events, readout_run_frames, score, spread,
+        LoadCurve, ReadoutStream, Tally, check_detections, check_plain_rule, check_readout, follow_rest, frame_ends,
+        is_plain_rule, make_plain_rule, make_readout, pairs, readout_run_events, readout_run_frames, score, spread,
     };
     #[pymodule_export]
     use crate::device::{SerialLine, line_place, now_ns, serial_ports, status_line};

@@ -17,7 +17,8 @@ from taxel.array import Array, of_size
 from taxel.cli._say import say
 from taxel.cli.app import OUTSIDE, WRONG_INPUT, Limits
 from taxel.cli.console import Console
-from taxel.detect import load
+from taxel.detect import PlainRule, Readout, load
+from taxel.detect.drift import left_line
 from taxel.live import Summary
 from taxel.live.options import LiveOptions
 from taxel.tare import Tare, seconds_of
@@ -172,12 +173,18 @@ _UNREAD = {
 }
 
 
-def say_wrong(counters: dict[str, Any], array: Array, told: set[tuple[str, str]]) -> None:
-    """Print what is wrong with what arrives, each once: `told` holds what was."""
+def say_wrong(
+    counters: dict[str, Any], array: Array, told: set[tuple[str, str]], readout: Readout | PlainRule | None = None
+) -> None:
+    """Print what is wrong with what arrives, each once: `told` holds what was; `readout` reads it, if any does."""
     say(*(f"taxel: {line}" for line in _unread(counters, told)), err=True)
     if ("", "outside") not in told and (wrong := outside(counters, array)):
         told.add(("", "outside"))
         say(f"taxel: {wrong}", err=True)
+    left = counters["left_floor"]
+    if readout is not None and left is not None and ("", "left_floor") not in told:
+        told.add(("", "left_floor"))
+        say(f"taxel: {left_line(readout, left['since_us'], left['taxels'])}", err=True)
 
 
 def _unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:

@@ -336,7 +336,7 @@ def _watch(
                 if fresh and pipeline.tare is not None:
                     fresh = False
                     _warn_of_unknown(pipeline.tare)
-            say_wrong(now, pipeline.array, told)
+            say_wrong(now, pipeline.array, told, pipeline._options.readout)
             if now["seconds"] - before["seconds"] >= REDRAW_S:
                 display.update(Text(f"{counters_line(before, now)}\n{_state(now, pipeline.place)}".rstrip()))
                 before = now

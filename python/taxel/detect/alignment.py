@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
-from taxel._core import ProblemError, Tally
+from taxel._core import ProblemError
 from taxel.detect.ages import Ages, onsets
-from taxel.detect.scoring import APART_US, tally
+from taxel.detect.scoring import APART_US, Tally, tally
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: How far from its label an input spike may be, either way, ms.
@@ -170,7 +170,7 @@ def _best(pairs: Mapping[int, Tally], labels: int) -> int | None:
     """Return the train that shows best when the events were felt; None if it has no spike near any label."""
     left = dict(pairs)
     criteria: list[tuple[Callable[[Tally], float], float]] = [
-        (lambda of: len(of.missed_events) + len(of.false_detections), max(_ALIKE, _ALIKE_SHARE * labels)),
+        (lambda of: of.wrong, max(_ALIKE, _ALIKE_SHARE * labels)),
         (lambda of: -len(of.detected), 0),
         (lambda of: float(np.median(np.abs(of.errors_ms))) if len(of.detected) else np.inf, _ALIKE_MS),
     ]

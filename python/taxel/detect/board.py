@@ -1,4 +1,4 @@
-"""What sent the data of a training, a board or a sensor of frames, and in what that of another time differs."""
+"""What a readout keeps of the data of its training, and in what a board or sensor of another time differs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from taxel._base.messages import plain, three_digits
 from taxel.detect.examples import Example, frame_ms
+from taxel.detect.scoring import Score
 from taxel.recorded import recorded
 from taxel.recording.recording import Recording
 from taxel.spikes import to_us
@@ -26,10 +27,18 @@ def noise_floor(source: object) -> float:
     return float(max(registers.noise_floor for registers in held))
 
 
-def of_training(examples: Sequence[Example]) -> dict[str, Any]:
-    """Return what a readout's file keeps of what sent the data of its training.
+def of_training(examples: Sequence[Example], scored: Score, noise_floor: float) -> dict[str, Any]:
+    """Return what a readout's file keeps of the data of its training.
 
-    Its ``board``, where it is known and always the same; ``period_us`` of frames; ``sides``, where all are stated.
+    Its ``noise_floor``; ``error_ms``, by how much detections of each label are late at the median; the ``board`` that
+    sent them, where it is known and always the same; ``period_us`` of frames; ``sides``, where all are stated.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+    scored : Score
+        Of the detector in its training data, or of folds of them.
+    noise_floor : float, in the sensor's unit
     """
     sources = [example.source for example in examples if isinstance(example.source, Recording)]
     boards = [summary(source.registers) for source in sources if source.has_events and source.registers is not None]
@@ -37,6 +46,8 @@ def of_training(examples: Sequence[Example]) -> dict[str, Any]:
     periods = [period for source in sources if (period := _period_us(source))]
     sides = {source.side for source in sources}
     return {
+        "noise_floor": noise_floor,
+        "error_ms": {label: float(part.error.median) for label, part in scored.by_label.items() if part.found},
         "board": boards[0] if boards and is_one else None,
         "period_us": float(np.median(periods)) if periods else None,
         "sides": [] if "" in sides else sorted(sides),

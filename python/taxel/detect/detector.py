@@ -20,7 +20,7 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import unit_of
 from taxel.recording.analysis.quiet import FORCE_UNITS, floor_at_rest
-from taxel.tare import Tare
+from taxel.tare import Tare, check_absorb
 from taxel.wire import FRAME_US
 
 
@@ -83,6 +83,28 @@ class _Detector(Saved):
         if tare is not None and self.unit is not None and are_counts(self.unit):
             least = floor_at_rest(tare.noise)
         return self._with_floor(least)
+
+    def absorbing(self, absorb_s: float | None) -> Self:
+        """Return it with another time after which a load that stays is rest, in frames, whose rest follows drift.
+
+        Parameters
+        ----------
+        absorb_s : float, s, from 1 to 1800, or 0, or None
+            0: the rest stays as it was measured. None: as it is.
+
+        Raises
+        ------
+        ProblemError : a time out of range; no noise floor is known, as of a readout that was not trained by taxel
+        """
+        check_absorb(absorb_s)
+        if absorb_s is None:
+            return self
+        parts = self._parts
+        floors = [part.get("noise_floor") for part in (parts.get("rest"), parts.get("training"), parts) if part]
+        floor = next((floor for floor in floors if floor is not None), None)
+        if floor is None:
+            raise refused("absorb_s", f" is given, but the {self._WHAT} states no noise floor: must be left out")
+        return self._with(rest={"noise_floor": floor, "absorb_s": absorb_s})
 
     def _with_floor(self, least: float) -> Self:
         """Return it with noise floors of so much at least."""

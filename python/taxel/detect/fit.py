@@ -24,6 +24,7 @@ from taxel.detect.ages import in_frames
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.board import noise_floor
 from taxel.detect.detector import raised
+from taxel.detect.drift import followed, rest_of
 from taxel.detect.examples import Example, array_of, check_examples, frame_ms, name_of, sizes_of, unit_of
 from taxel.detect.fitted_point import FittedPoint, Inputs
 from taxel.detect.floors import floor_alone, floor_of
@@ -34,7 +35,7 @@ from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score_together, tally
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.tuning import Tuning
+from taxel.detect.tuning import OFF, OFF_COST, Tuning
 from taxel.detections import Detections
 from taxel.encode import Composite, Encoder, LocalLoad, Moments
 from taxel.events import Events
@@ -114,8 +115,8 @@ def fit(
     -----
     Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours). The event is the label,
     or where the recipe aligns labels what the sensor felt of it. Which of neuron and rule is better is found by
-    training on each half of the data and detecting in the other: the rule, unless the neuron leaves fewer missed and
-    false by more than two standard errors over the recordings, or as many in each and knows earlier.
+    training on each half of the data and detecting in the other: what makes fewer mistakes by more than a standard
+    error over the recordings, else what knows earlier, then what is nearer to the labels.
 
     Examples
     --------
@@ -160,6 +161,8 @@ class Fitter:
         Of scores.
     frame_us : float, us, optional
         As in `taxel.detect.run`.
+    absorb_s : float, s, optional
+        After how long a load that stays is rest, in frames; 0: the rest stays. Default: `taxel.detect.drift.rest_of`.
     progress : function of (step, done, all), optional
 
     Raises
@@ -174,22 +177,29 @@ class Fitter:
         *,
         window_ms: float = 50.0,
         frame_us: float | None = None,
+        absorb_s: float | None = None,
         progress: Progress | None = None,
     ) -> None:
         if frame_us is not None:
             finite("frame_us", frame_us, least=1.0, most=3.6e9)
         clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
-        self.examples, self.clocks = check_examples(examples), clocks
+        checked, self.clocks = check_examples(examples), clocks
+        of_board = max(noise_floor(example[0]) for example in examples)
+        #: By which loads are measured, in the sensor's unit.
+        self.noise_floor = max(floor_of(checked), of_board)
+        self._rest = rest_of(checked, self.noise_floor, absorb_s)
+        self.examples = [followed(example, self._rest) for example in checked]
         self.window_ms = finite("window_ms", window_ms, least=0.0, most=3.6e6)
         self.report = reporting(progress)
         #: Makes the same fitter in another process, where nobody is told of its progress.
-        self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us)
+        self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us, absorb_s=absorb_s)
         #: All of the examples.
         self.whole = whole(self.examples)
-        of_board = max(noise_floor(example[0]) for example in examples)
         recipe = _above(instance("recipe", recipe, Recipe), of_board)
         self._in_frames = in_frames(recipe, self.examples, clocks)
         self._recipe = _possible(self._in_frames, self.examples)
+        if self._rest is not None and self._rest["absorb_s"]:
+            self._recipe = replace(self._recipe, encoder=_from_tare(self._recipe.encoder))
         self.array, self._unit = array_of(self.examples), unit_of(self.examples)
         self._pads = len(sizes_of(examples)) > 0
         self.labels = _labels_to_learn(self.examples, recipe)
@@ -197,7 +207,7 @@ class Fitter:
         self.lacks = lacks(self.examples)
         self._tuning: Tuning | None = None
         if not self.lacks:
-            loads = Loads(self.examples, clocks, max(floor_of(self.examples), of_board), self.report)
+            loads = Loads(self.examples, clocks, self.noise_floor, self.report)
             self._tuning = Tuning(loads, self.labels, self.window_ms)
         # The quantity whose thresholds the labels are.
         self._own = min((example.labels_of for example in self.examples if example.labels_of), default=None)
@@ -230,7 +240,7 @@ class Fitter:
         plan = replace(plan, neurons=points)
         known = {label: rule for label, rule in rules.items() if rule is not None}
         readout = _readout_of(learners, delays, plan, array=self.array, unit=self._unit, rules=known)
-        return Trained(plan, learners, readout._with(pads=True) if self._pads else readout, alignments)
+        return Trained(plan, learners, readout._with(pads=self._pads, rest=self._rest), alignments)
 
     def _silent(self, label: str) -> TrainedNeuron:
         """Return a neuron that never fires."""
@@ -269,7 +279,8 @@ class Fitter:
                 found += [self.detected(trained, part) for part in tested]
                 parts_found += tested
         each = ([one.by_neurons for one in found], [one.by_rules for one in found])
-        better = better_by_rule(others, *(self.scores(way, parts_found) for way in each)) if found else ()
+        ways = (self.scores(way, parts_found) for way in each)
+        better = better_by_rule(others, self.off_ms, *ways) if found else ()
         return tuple(label for label in self.labels if label in sure or label in better)
 
     def _surely_by_rule(self, folds: Sequence[Fold], tuned: Sequence[Rules]) -> frozenset[str]:
@@ -347,6 +358,11 @@ class Fitter:
         """Return by how much the labels of each name are later than what was felt, ms, of those that are."""
         constants = {} if self._tuning is None else {label: self._tuning.constant_ms(label) for label in self.labels}
         return {label: ms for label, ms in constants.items() if ms}
+
+    @property
+    def off_ms(self) -> float:
+        """From how far off a detection is part of a mistake, ms."""
+        return OFF * self.window_ms if self._tuning is None else self._tuning.off_ms
 
     def inside_loads(self, labels: Sequence[str]) -> dict[str, int]:
         """Return how many events of each label lie within a load, farther from its begin and end than the window."""
@@ -450,7 +466,8 @@ class Fitter:
             return None
         times = [np.full(len(each), np.nan) for each in labels]
         for felt, given, part in zip(times, labels, parts, strict=True):
-            t = self._tuning.detected(rule, label, part).t
+            # The trains of what was felt come at its own time, which the rule's constant is not taken off.
+            t = self._tuning.detected(rule, label, part).t + round(float(to_us(rule.constant_ms)))
             if (pairs := tally(t, t, given, round(to_us(WINDOW_MS)))) is not None:
                 felt[pairs.events] = t[pairs.detected]
         count = sum(map(len, labels))
@@ -477,27 +494,35 @@ def _known(
     return known
 
 
-def better_by_rule(labels: Sequence[str], neurons: Sequence[Score], rules: Sequence[Score]) -> tuple[str, ...]:
+def better_by_rule(
+    labels: Sequence[str], off_ms: float, neurons: Sequence[Score], rules: Sequence[Score]
+) -> tuple[str, ...]:
     """Return the labels that rules detect better than neurons, by scores of both in the same parts of recordings.
 
-    A neuron is better with fewer missed and false, by more than two standard errors of the paired difference over the
-    parts: what one recording shows may be chance, and the rule is simpler. With as many in each, what knows earlier at
-    the median is better.
+    Better is what makes fewer mistakes, by more than a standard error of the paired difference over the parts; one that
+    is farther off than `off_ms` is part of a mistake (`taxel.detect.tune`). Where that is not told apart, what knows
+    earlier at the median is better, then what is nearer to its label, then the rule.
     """
 
-    def known(scores: Sequence[Score], label: str) -> float:
-        delays = np.concatenate([one.by_label[label].delays_ms for one in scores if label in one.by_label])
-        return float(np.median(delays)) if len(delays) else np.inf
+    def joined(scores: Sequence[Score], label: str, what: str) -> NDArray[np.float64]:
+        return np.concatenate([getattr(one.by_label[label], what) for one in scores if label in one.by_label])
 
-    def wrong(scores: Sequence[Score], label: str) -> NDArray[np.int64]:
-        return np.array([one.by_label[label].rank[0] if label in one.by_label else 0 for one in scores])
+    def cost(scores: Sequence[Score], label: str) -> NDArray[np.float64]:
+        of = [one.by_label.get(label) for one in scores]
+        return np.array(
+            [0.0 if one is None else one.rank[0] + OFF_COST * (np.abs(one.errors_ms) > off_ms).sum() for one in of]
+        )
+
+    def later(scores: Sequence[Score], label: str) -> tuple[float, float]:
+        known, error = joined(scores, label, "delays_ms"), np.abs(joined(scores, label, "errors_ms"))
+        return (float(np.median(known)), float(np.median(error))) if len(known) else (np.inf, np.inf)
 
     def by_rule(label: str) -> bool:
-        fewer = wrong(rules, label) - wrong(neurons, label)
-        if not fewer.any():
-            return known(rules, label) <= known(neurons, label)
-        by_chance = np.sqrt(len(fewer)) * np.std(fewer, ddof=1) if len(fewer) > 1 else 0.0
-        return bool(fewer.sum() <= 2.0 * by_chance)
+        more = cost(rules, label) - cost(neurons, label)
+        by_chance = np.sqrt(len(more)) * np.std(more, ddof=1) if len(more) > 1 else 0.0
+        if abs(more.sum()) > by_chance:
+            return bool(more.sum() < 0)
+        return later(rules, label) <= later(neurons, label)
 
     return tuple(label for label in labels if by_rule(label))
 
@@ -507,6 +532,16 @@ def _above(recipe: Recipe, noise_floor: float) -> Recipe:
     parts = json.loads(recipe.encoder.to_json())
     above = raised(parts, noise_floor)
     return recipe if above == parts else replace(recipe, encoder=Encoder.from_json(parameters(above)))
+
+
+def _from_tare(encoder: Encoder) -> Encoder:
+    """Return an encoder whose local loads are from the tare, where the rest of all that is read follows.
+
+    Their own rest, which follows what is far in 20 s, swallows presses of half a minute (fingers: 154 of 550).
+    """
+    if isinstance(encoder, Composite):
+        return Composite({name: _from_tare(part) for name, part in encoder.parts.items()})
+    return copy(encoder).set_params(rest="tare") if isinstance(encoder, LocalLoad) else encoder
 
 
 def _possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:

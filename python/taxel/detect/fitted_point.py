@@ -149,7 +149,7 @@ class Inputs:
             t = t[(t >= part.start) & (t < part.stop)]
             if (pairs := tally(t, t, times, round(to_us(WINDOW_MS)))) is not None:
                 found += len(pairs.detected)
-                wrong += len(pairs.missed_events) + len(pairs.false_detections)
+                wrong += pairs.wrong
         return found, wrong
 
     def _check_inside(self) -> None:

@@ -78,7 +78,7 @@ class Judged:
     mistakes : tuple of Mistake
         What the scores of each example call missed and false.
     by_rule : tuple of str
-        The labels that their plain rule detects better than their neuron in all folds, or as well but for chance. The
+        The labels that their plain rule detects better than their neuron in all folds. The
         score of each fold is of what was better inside its training data.
     """
 
@@ -193,7 +193,7 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
     own_score = (own_rules, fitter.score(each("by_own"), parts)) if any(own_rules.values()) else None
     plain = PlainScore(tuned, None if fitter.lacks else rules, own_score, fitter.lacks)
     with_rules = [label for label in fitter.labels if tuned[label] is not None]
-    better = better_by_rule(with_rules, *(fitter.scores(each(way), parts) for way in ways))
+    better = better_by_rule(with_rules, fitter.off_ms, *(fitter.scores(each(way), parts) for way in ways))
     joined, truths = _by_example(fitter, parts, chosen)
     scores = tuple(score(*compared, fitter.window_ms) for compared in zip(joined, truths, strict=True))
     together = score_together(joined, truths, fitter.window_ms)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
@@ -14,16 +15,16 @@ from taxel.detect.detector import tare_text
 from taxel.detect.examples import Example, frame_ms, name_of, unit_of
 from taxel.detect.floors import TOUCH
 from taxel.detect.scoring import APART_US
+from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
-#: Local loads above and below their running mean, which are measured together with the local load.
-CHANGES = ("local_rise", "local_fall")
-LOCAL = ("local_load", *CHANGES)
-#: The peak that noise does not reach.
-PEAK = 6.0
+#: The quantities that are changes of a load: each begins where a load begins, ends, or moves.
+CHANGES = ("rise", "fall", "moved", "local_rise", "local_fall")
+#: Quantities that are measured together.
+_TOGETHER = (("load_without_largest", "load"), ("rise", "fall", "moved"), ("local_load", "local_rise", "local_fall"))
 #: Of an example so many frames at least are read for the levels of counts, if it has them; at most twice as many.
 _READ_FRAMES = 5000
 
@@ -65,12 +66,11 @@ class EdgeRule(NamedTuple):
     """The numbers of a rule that finds begins and ends of loads, as of `PlainRule`."""
 
     quantity: str
-    threshold: float
+    level: float
     release: float = 1.0
-    frames: int = 1
+    quiet_ms: float = 0.0
+    date: float | None = None
     levels: tuple[float, ...] = ()
-    dated_at: float | None = None
-    of_largest: bool = False
 
 
 class Loads:
@@ -88,15 +88,20 @@ class Loads:
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
-        self._frame_ms = max(frame_ms(example.source) for example in examples)
+        self.frame_ms = max(frame_ms(example.source) for example in examples)
         self._curves: dict[tuple[str, tuple[float, ...]], list[_core.LoadCurve]] = {}
         self._changes: dict[tuple[str, tuple[float, ...]], list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._ages: dict[float, FoundTimes] = {}
 
     @property
     def have_rest(self) -> bool:
-        """Whether each example has a tare; without one only counts by running range can be computed."""
+        """Whether each example has a tare; without one only the load by running range can be computed."""
         return all(example.tare is not None for example in self._examples)
+
+    @property
+    def taxels(self) -> int:
+        """The number of taxels."""
+        return min(example.source.array.taxels for example in self._examples)  # type: ignore[union-attr]
 
     @property
     def are_channels(self) -> bool:
@@ -105,8 +110,8 @@ class Loads:
 
     @property
     def of_touches(self) -> EdgeRule:
-        """The rule of touches: two taxels or more are loaded, or a channel is above its noise."""
-        return EdgeRule("peak", PEAK) if self.are_channels else EdgeRule("area", TOUCH)
+        """The rule of touches: two taxels or more are loaded, or a channel."""
+        return EdgeRule("area", 1.0 if self.are_channels else TOUCH)
 
     @property
     def are_frames(self) -> bool:
@@ -122,7 +127,7 @@ class Loads:
         """Return a quantity of each example; `levels` are those of a count."""
         if (quantity, levels) not in self._curves:
             self._report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
-            together = LOCAL if quantity in LOCAL else (quantity,)
+            together = next((names for names in _TOGETHER if quantity in names), (quantity,))
             measured = [
                 _curves(together, levels, self.noise_floor, example, *clock)
                 for example, clock in zip(self._examples, self._clocks, strict=True)
@@ -132,22 +137,25 @@ class Loads:
             }
         return self._curves[quantity, levels]
 
-    def readings(self, parts: Iterable[Stretch]) -> NDArray[np.float64]:
-        """Return what loaded taxels of frames read above their rest in parts of the examples, of spaced frames."""
+    @cached_property
+    def readings(self) -> NDArray[np.float64]:
+        """What loaded taxels read above rest: of events each, of frames those of spaced ones."""
         loaded = [np.empty(0)]
-        for k, start, stop in parts:
-            source, tare = self._examples[k].source, self._examples[k].tare
-            if not isinstance(source, Frames) or tare is None:
+        for source, tare in ((example.source, example.tare) for example in self._examples):
+            if tare is None or isinstance(source, SpikeTrains):
                 continue
-            every = slice(None, None, 1 + len(source) // _READ_FRAMES)
-            inside = (source.t[every] >= start) & (source.t[every] < stop)
-            above = source.values[every][inside].astype(np.float64) - tare.rest
+            if isinstance(source, Frames):
+                every = slice(None, None, 1 + len(source) // _READ_FRAMES)
+                above = source.values[every].astype(np.float64) - tare.rest
+            else:
+                assert isinstance(source, Events)
+                above = np.asarray(source.intensity, np.float64) - tare.rest[source.y, source.x]
             loaded.append(above[above > self.noise_floor])
         return np.concatenate(loaded)
 
     def edges(self, rule: EdgeRule) -> tuple[FoundTimes, FoundTimes]:
         """Return the begins and the ends of loads."""
-        numbers = rule.threshold, rule.release, rule.frames, rule.dated_at, rule.of_largest
+        numbers = rule.level, rule.release, rule.quiet_ms, rule.date
         sides = zip(*(curve.edges(*numbers) for curve in self._curves_of(rule.quantity, rule.levels)), strict=True)
         begins, ends = map(self._together, sides)
         return begins, ends
@@ -159,10 +167,10 @@ class Loads:
         the middle of the time for which it holds, as stamps are not regular. The longest frame
         of several examples counts.
         """
-        if not self._frame_ms:
+        if not self.frame_ms:
             return list(ages_ms)
-        holds = sorted({int(age / self._frame_ms + 1e-6) for age in ages_ms})
-        return [to_ms(round(to_us((k + 0.5) * self._frame_ms))) if k else 0.0 for k in holds]
+        holds = sorted({int(age / self.frame_ms + 1e-6) for age in ages_ms})
+        return [to_ms(round(to_us((k + 0.5) * self.frame_ms))) if k else 0.0 for k in holds]
 
     def at_age(self, age_ms: float) -> FoundTimes:
         """Return the area at an age of every touch."""
@@ -211,12 +219,13 @@ class Loads:
         """Return how many labels of a name lie within a load, so far from its begin and its end at least."""
         if not self.have_rest:
             return 0
-        rule = EdgeRule("peak", PEAK) if self.are_channels else EdgeRule("area", 1.0)
-        begins, ends = (np.sort(edge.t) for edge in self.edges(rule))
+        begins, ends = (np.sort(edge.t) for edge in self.edges(EdgeRule("area", 1.0)))
         times = self.truth(name, self.whole_examples)
-        began = np.searchsorted(begins, times - away_us, side="right") - np.searchsorted(ends, times - away_us, "right")
+        began, ended = (
+            np.append(-(2**62), edge)[np.searchsorted(edge, times - away_us, side="right")] for edge in (begins, ends)
+        )
         lasts = np.searchsorted(ends, times + away_us) == np.searchsorted(ends, times - away_us, side="right")
-        return int(np.count_nonzero((began > 0) & lasts))
+        return int(np.count_nonzero((began > ended) & lasts))
 
     def windows(self, parts: Iterable[Stretch]) -> NDArray[np.int64]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""

@@ -44,6 +44,8 @@ class FittedLearner(Protocol):
     weights_: NDArray[np.float64]
 
 
+#: What the file of a rule has that its part of a readout's lacks.
+_OF_FILE = ("format", "version", "tare", "rest", "training")
 #: What detects the labels of a readout: for each what was better in training, or its plain rule, or its neuron.
 USES = ("better", "rule", "neuron")
 
@@ -436,6 +438,22 @@ def run(
     >>> found.t, found.known
     (array([10479]), array([20000]))
     """
+    how = (frame_us, tare, wire_version, begin_us)
+    return run_watched(readout, source, *how)[0]
+
+
+def run_watched(
+    readout: _Detector,
+    source: Recording | Events | Frames | SpikeTrains,
+    frame_us: float | None = None,
+    tare: Tare | None = None,
+    wire_version: int | None = None,
+    begin_us: int | None = None,
+) -> tuple[Detections, tuple[int, int] | None]:
+    """Return what `run` does, and since when (us) so many taxels at rest have left the noise floor of the training.
+
+    None of frames that did not, and of all else.
+    """
     checked = detector("readout", readout)
     if isinstance(source, Recording) and tare is None:
         checked._check_unit(unit_of(recorded(source, hold=False)))
@@ -459,7 +477,7 @@ def run(
                 "source",
                 f" is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames, for a plain rule",
             )
-        return _run_spikes(readout, source)
+        return _run_spikes(readout, source), None
     if isinstance(source, Events | Frames):
         readout._check_unit(unit_of(source))
         for array in (readout.array, None if tare is None else tare.array):
@@ -468,12 +486,13 @@ def run(
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
         columns = _core.readout_run_events(text, source, period, version, given, zeroings, begin_us)
-        return Detections._from_parts(columns)
+        return Detections._from_parts(columns), None
     if not isinstance(source, Frames):
         raise refused(
             "source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
-    return Detections._from_parts(_core.readout_run_frames(text, source, period, given, zeroings, begin_us))
+    columns, left = _core.readout_run_frames(text, source, period, given, zeroings, begin_us)
+    return Detections._from_parts(columns), left
 
 
 def _receives(encoder: Encoder, trained: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
@@ -487,7 +506,7 @@ def _rule_parts(rules: Mapping[str, Any]) -> dict[str, Any]:
     """Return plain rules as parts of a readout's file, which holds what the data of their training were like."""
     parts = {text("label", label): instance(f"{label}: rule", rule, PlainRule)._parts for label, rule in rules.items()}
     return {
-        label: {name: part for name, part in of_rule.items() if name not in ("format", "version", "tare", "training")}
+        label: {name: part for name, part in of_rule.items() if name not in _OF_FILE}
         for label, of_rule in parts.items()
     }
 

@@ -18,7 +18,7 @@ from taxel._base.messages import counted, escaped, plain, three_digits
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.labels import Note
-from taxel.spikes import to_us
+from taxel.spikes import to_ms, to_us
 
 #: Distance between recordings that are scored together, us: no detection pairs with an event of another recording.
 APART_US = 10**12
@@ -261,13 +261,25 @@ def score(
     return Score(parts[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
 
 
-def tally(
-    t: NDArray[np.int64], known: NDArray[np.int64], events: NDArray[np.int64], window_us: int
-) -> _core.Tally | None:
+class Tally(NamedTuple):
+    """How detections of one label pair with its events: places of both, how many are alone, how far and late, ms."""
+
+    detected: NDArray[np.int64]
+    events: NDArray[np.int64]
+    wrong: int
+    errors_ms: NDArray[np.float64]
+    delays_ms: NDArray[np.float64]
+
+
+def tally(t: NDArray[np.int64], known: NDArray[np.int64], events: NDArray[np.int64], window_us: int) -> Tally | None:
     """Return how detections of one label pair with its events, as `score` pairs them; None without any of both."""
-    parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
-    tallies = _core.score(parts, [""] * len(events), events, np.full(len(events), window_us, np.int64))
-    return tallies[0] if tallies else None
+    if not len(t) and not len(events):
+        return None
+    orders = np.argsort(t, kind="stable"), np.argsort(events, kind="stable")
+    pairs = _core.pairs(t[orders[0]], events[orders[1]], window_us)
+    detected, met = (order[place] for order, place in zip(orders, pairs, strict=True))
+    wrong = len(t) + len(events) - 2 * len(met)
+    return Tally(detected, met, wrong, to_ms(t[detected] - events[met]), to_ms(known[detected] - events[met]))
 
 
 def mistakes_of(

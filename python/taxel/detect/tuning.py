@@ -1,15 +1,15 @@
-"""The plain rule that fits labelled recordings best, by trying a grid of them on the loads of each recording."""
+"""The plain rule that fits labelled recordings best, by one search over all quantities of a load."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import finite, number, several, text
+from taxel._base.arguments import finite, several, text
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import recipes
@@ -17,46 +17,46 @@ from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks, within
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.scoring import many, tally
-from taxel.spikes import SpikeTrains, to_ms, to_us
+from taxel.spikes import SpikeTrains, to_us
 
-#: Thresholds of the area, taxels.
-AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-#: Thresholds of the total: steps of a ladder with so many a decade, between these quantiles of its values above 0. The
-#: upper quantile of readings is what they are at most.
-STEPS_A_DECADE, QUANTILES = 8, (0.0, 0.95)
-#: Thresholds of local loads, units of noise.
-LOCAL_LOADS = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
-#: Thresholds of the peak, units of noise.
-PEAKS = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
-#: Parts of the threshold below which a load ends.
-RELEASES = (0.5, 1.0)
-#: How many frames in a row decide.
-FRAMES = (1, 2, 5, 10, 20)
-#: Parts of its largest value below which a load ends, where its rest follows; and how many frames in a row decide then.
-OF_LARGEST, FRAMES_OF_LARGEST = (0.1, 0.25, 0.5, 0.75), (1, 5)
-#: Levels of a count by the unit: thesis 6.5.3.
-LEVELS = {"N": (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)}
-#: Levels of a count in parts of the running range, and of what loaded taxels read at most; most are low, where loads
-#: begin and end.
-LEVEL_SHARES = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.45)
+#: Levels of a quantity are so many quantiles of it where it is loaded, which tell weak loads apart, and so many
+#: geometric steps from its noise to its largest value, which short events reach.
+QUANTILES, STEPS = 15, 15
+#: They stand on a ladder of so many a decade.
+LADDER = 24
+#: Parts of the level below which a load ends.
+RELEASES = (0.25, 0.5, 0.75, 1.0)
+#: For how long it is below that, ms.
+QUIETS_MS = (0.0, 50.0)
+#: So many levels of a count are geometric steps from the noise floor, or of channels from that part of it, to this
+#: quantile of what loaded taxels read.
+LEVELS, LEAST_SHARE, MOST = 8, 0.1, 0.5
+#: Without its largest taxel the load of so many taxels is tried.
+SPARE = 8
 #: Levels of the area where a touch began, ms, each alone.
 BEGIN_LEVELS_MS = (10.0, 20.0, 30.0)
-#: Numbers that a count rises to, or falls from.
-COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256)
-#: The numbers that it was at most before it, or falls to, as parts of it, beside one less.
-COUNT_RELEASES = (0.0, 0.25, 0.5, 0.75)
-#: At so many numbers between the two a detection is dated.
-DATES = 6
+#: What counts first where rules are equal: a bad taxel is not in the first, and loads are what people see.
+FIRST = (("load_without_largest",), ("load", "count", "range_load"))
+#: Where noise alone is, of quantities in other units than the sensor's.
+_LEAST = {"range_load": 0.01, "local_load": 3.0, "local_rise": 3.0, "local_fall": 3.0}
+#: Quantities that are whole numbers.
+_WHOLE = ("count", "area", "begin_area")
+#: So many rules are compared at once.
+_ROWS = 128
 #: Ages at which kinds are decided, ms.
 AGES_MS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 20.0, 30.0, 50.0)
-#: Rules are equally often right whose missed and false differ by at most that share of the labels: more is noise.
-EQUAL_SHARE = 0.002
-#: ... and so many of them within `NEAR_US`, beside one: of few labels one is noise.
-NEAR_US = 10_000
+#: A detection that is farther off than this part of the window is that part of a mistake: half a one made rules wrong
+#: more often on gaitndd (foot-off, 12 people left out in fives: 199, not 136).
+OFF, OFF_COST = 0.2, 0.1
+#: Rules are equal whose mistakes differ by at most one, by that share of the labels, or by that part of the root of how
+#: many are mistakes or off: more is chance.
+EQUAL_SHARE, EQUAL_ROOT = 0.002, 0.5
+#: ... and a quantity is preferred where so many levels of one rule are equal: one alone is luck.
+PLATEAU = 3
 #: Labels of one name may be so far off what was felt, ms; farther off they are of another clock, or of other loads.
 FAR_MS = 250.0
 #: They are off by one constant where of so many at least this share is within so many ms of it.
-_LEAST, _MOST, _SAME_MS = 8, 0.8, 100.0
+_FEWEST, _MOST, _SAME_MS = 8, 0.8, 100.0
 #: ... and with it taken off, so many fewer are missed and false, and that share of the labels.
 _FEWER, _FEWER_SHARE = 3, 0.05
 
@@ -66,17 +66,29 @@ class _RuleFit(NamedTuple):
 
     wrong: int
     """Missed and false."""
-    near: int
-    """How many of those that were found are within `NEAR_US` of their label."""
+    off: int
+    """How many of those that were found are off."""
+    constant_ms: float
+    """The median distance of what was found from the labels, less which they are off."""
     delay_ms: float
     """Median distance of `known` from the label of those that were found; infinite without any."""
-    error_ms: float
-    """Median distance of a detection from its label; infinite without any."""
+
+    @property
+    def cost(self) -> float:
+        """Mistakes, of which those that are off are parts."""
+        return self.wrong + OFF_COST * self.off
+
+    def room(self, labels: int) -> float:
+        """Return by how much more the cost of an equal rule for so many labels may be."""
+        return float(max(1.0, EQUAL_SHARE * labels, EQUAL_ROOT * (self.wrong + self.off) ** 0.5))
+
+
+_NONE = _RuleFit(2**31, 0, np.inf, np.inf)
 
 
 class _Best(NamedTuple):
     fit: _RuleFit
-    rule: PlainRule
+    rule: PlainRule | None
 
 
 def tune(
@@ -87,33 +99,29 @@ def tune(
     noise_floor: float = 3.0,
     progress: Progress | None = None,
 ) -> dict[str, PlainRule | None]:
-    """Return for each label the plain rule with the fewest missed and false detections, and of these the nearest one.
+    """Return for each label the plain rule with the fewest mistakes, dated and less its constant.
 
-    Of rules whose missed and false differ by at most .2 % of the labels, the one counts with the most detections within
-    10 ms of their label, and of these the one whose `known` is nearest to it at the median, before as after it: what is
-    known earlier responds to something else.
+    A mistake is a missed or a false detection; one that is farther off than a fifth of the window, and a frame at
+    least, is a tenth of one. Rules are equal whose mistakes differ by no more than one, .2 % of the labels, and half
+    the root of the number of those that are wrong or off. Of equal ones counts first the load without its largest
+    taxel, then a load or a count, then any other, where three levels are equal; of these the least `known`, to a
+    fifth of the window, the fewest mistakes, to .2 % of the labels, and the level in the lower quarter of those that do
+    as well with the same other numbers. None is known later than the window, at the median.
 
-    Of thresholds alike in all else that are equally right it is the middle one; so it is of the numbers that a count
-    falls from.
-
-    Tried are thresholds of the area (`AREAS`), of the total (`STEPS_A_DECADE`), of the local load, its rise and its
-    fall (`LOCAL_LOADS`) and of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at
-    the onset and at the end of a load; of channels those of peak and total alone. Of frames so are thresholds of total
-    and peak with ends at parts of what they were at most (`OF_LARGEST`), and counts of levels that are on: levels by
-    the unit (`LEVELS`), and in parts of what loaded taxels read at most and of the running range (`LEVEL_SHARES`), of
-    which a load begins where the count rises to one number after it was at most another, and ends likewise, dated at a
-    number between them. Of a grid so are the taxels by which a touch began (`BEGIN_LEVELS_MS`).
+    Tried are quantities of a load (`PlainRule`), each at levels that are quantiles and geometric steps of its values
+    (`QUANTILES`, `STEPS`) on a ladder (`LADDER`), which end at parts of these (`RELEASES`) after a quiet time
+    (`QUIETS_MS`), dated at the level or halfway to its release.
 
     Two labels are kinds where exactly two are nearer to onsets than to ends, or where there are only two: then
-    thresholds of the area at each of `AGES_MS` are tried too, on a logarithmic scale, and thresholds of the duration as
+    levels of the area at each of `AGES_MS` are tried too, on a logarithmic scale, and levels of the duration as
     touches end, and hold for both where they are better for both together. Each frame that holds at one of these ages
     counts once.
 
     Parameters
     ----------
     examples : sequence of Example
-        A label that an example lacks is not in it. Sources that are spike trains have no load; without a tare there are
-        only counts by running range. Rules of the quantity whose thresholds the labels are (`Example`) are not tried.
+        A label that an example lacks is not in it. Sources that are spike trains have no load; without a tare there is
+        only the load by running range. Rules of the quantity whose thresholds the labels are (`Example`) are not tried.
     labels : sequence of str, optional
         Those to find rules for; default: all.
     window_ms : float, ms, 0 or more
@@ -135,9 +143,7 @@ def tune(
 
     Notes
     -----
-    If rules are equal, the first counts: area before total before local loads before peak before counts, few frames
-    before many. A rule that misses and invents as many as there are labels is no better than
-    none.
+    A rule that misses and invents as many as there are labels is no better than none.
 
     Examples
     --------
@@ -146,9 +152,9 @@ def tune(
     >>> example = Example(frames, {"touch": [20_000], "removal": [50_000]}, Tare.take(frames, stop_us=20_000))
     >>> rules = tune([example], window_ms=5.0)
     >>> rules["touch"]
-    PlainRule(touch: area >= 1, release 0.5, 1 frame)
+    PlainRule(touch: load (ticks) >= 9, release 1)
     >>> rules["removal"]
-    PlainRule(removal: area falls below 0.5 after 1 or more, 1 frame)
+    PlainRule(removal: load (ticks) falls below 9 after 9 or more)
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
     sound = check_examples(examples)
@@ -158,7 +164,7 @@ def tune(
     )
     names = [text("labels", name) for name in names]
     width_ms = finite("window_ms", window_ms, least=0.0, most=3.6e6)
-    floor = number("noise_floor", noise_floor)
+    floor = finite("noise_floor", noise_floor, least=0.0)
     if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)
     if why := lacks(sound):
@@ -168,14 +174,25 @@ def tune(
 
 
 class _Outcomes(NamedTuple):
-    """What a rule made of the labels of one name: a row each label, then one each false detection."""
+    """What a rule made of the labels of one name."""
 
-    t: NDArray[np.int64]
-    """The label, or the false detection, us on the one clock."""
     error_ms: NDArray[np.float32]
-    """How far its detection is from a label; NaN of one that is missed, infinite of a false detection."""
+    """How far the detection of each label is from it, later is positive; NaN of one that is missed."""
     delay_ms: NDArray[np.float32]
     """How far `known` is from it; likewise."""
+    false: NDArray[np.int64]
+    """The false detections, us on the one clock."""
+
+
+class _Table(NamedTuple):
+    """What several rules made of the labels of one name, as rows of their outcomes."""
+
+    rules: Sequence[EdgeRule]
+    error_ms: NDArray[np.float32]
+    delay_ms: NDArray[np.float32]
+    false: NDArray[np.int64]
+    """The false detections of all, us, and of which rule each is."""
+    of: NDArray[np.int64]
 
 
 class Tuning:
@@ -191,86 +208,132 @@ class Tuning:
     """
 
     def __init__(self, loads: Loads, names: Sequence[str], window_ms: float) -> None:
-        self.loads, self._names, self._width_us = loads, list(names), round(float(to_us(window_ms)))
+        self.loads, self._names, self._window_ms = loads, list(names), window_ms
+        self._width_us = round(float(to_us(window_ms)))
+        #: From how far off a detection is part of a mistake.
+        self.off_ms = max(OFF * window_ms, loads.frame_ms)
         self._truth = {name: loads.truth(name, loads.whole_examples) for name in names}
         self._windows = loads.windows(loads.whole_examples)
-        self._outcomes: dict[EdgeRule, dict[tuple[str, int], _Outcomes]] = {}
+        self._tried: dict[EdgeRule, dict[tuple[str, int], _Outcomes]] = {}
 
     def best_rules(self, parts: Sequence[Stretch], only: str | None = None) -> dict[str, PlainRule | None]:
         """Return for each label the best rule on parts of the examples, as `tune` does on all of them.
 
-        `only`: rules of this quantity are tried alone, also where labels are thresholds of it.
+        `only`: rules of this quantity are tried alone, also where labels are levels of it.
         """
+        windows = self.loads.windows(parts)
         truth = {name: self.loads.truth(name, parts) for name in self._names}
-        points = list(_points(self.loads, parts, only))
-        best = {name: self._at_edges(name, points, parts) for name in self._names}
-        onsets = [name for name, pair in best.items() if _is_onset(*pair)]
-        single = {name: _better(pair, len(truth[name])) for name, pair in best.items()}
+        grid = list(_grid(self.loads, parts, only))
+        edges = {name: tuple(self._best_at(name, edge, windows, grid) for edge in (0, 1)) for name in self._names}
+        onsets = [name for name, pair in edges.items() if _is_onset(*pair)]
+        single = {name: self._better(pair, len(truth[name])) for name, pair in edges.items()}
         kinds = onsets if len(onsets) == 2 else self._names if len(self._names) == 2 else []
         if kinds and only is None and self.loads.have_rest:
-            windows = self.loads.windows(parts)
             touches: dict[float | str, FoundTimes] = {
                 age: self.loads.at_age(age).between(windows) for age in self.loads.ages_ms(AGES_MS)
             }
             # What is known last is tried last.
             touches["end"] = self.loads.at_end().between(windows)
-            found = _for_kinds(touches, kinds, truth, self._width_us, self.loads.noise_floor, self.loads.unit)
-            if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
+            found = self._for_kinds(touches, kinds, truth)
+            if found is not None and sum(one.fit.cost for one in found) < sum(single[name].fit.cost for name in kinds):
                 single |= dict(zip(kinds, found, strict=True))
-        return {name: tuned.rule if tuned.fit.wrong < len(truth[name]) else None for name, tuned in single.items()}
+        return {name: best.rule if best.fit.wrong < len(truth[name]) else None for name, best in single.items()}
 
-    def _at_edges(self, name: str, points: Sequence[EdgeRule], parts: Sequence[Stretch]) -> tuple[_Best, _Best]:
-        """Return the best rule for a label at onsets, and the best at ends."""
-        windows = self.loads.windows(parts)
-        onset, end = (self._best_at(name, edge, points, windows) for edge in (0, 1))
-        return onset, end
+    def _better(self, pair: Sequence[_Best], labels: int) -> _Best:
+        """Return the better of two rules for so many labels, of equal ones the preferred, then the one nearer."""
+        best = min(pair, key=lambda one: one.fit.cost)
+        equal = [one for one in pair if one.fit.cost <= best.fit.cost + best.fit.room(labels)]
+        return min(equal, key=lambda one: (_rank(one.rule), abs(one.fit.constant_ms)), default=best)
 
-    def _best_at(self, name: str, edge: int, points: Sequence[EdgeRule], windows: NDArray[np.int64]) -> _Best:
+    def _best_at(self, name: str, edge: int, windows: NDArray[np.int64], grid: Iterable[EdgeRule]) -> _Best:
         """Return the best rule for a label at one edge of loads, in windows on the one clock."""
+        labels = int(np.count_nonzero(within(self._truth[name], windows)))
         # A change of the load begins where the load begins or ends; it ends as it is forgotten.
-        possible = [point for point in points if edge == 0 or point.quantity not in CHANGES]
-        tried = [(point, found) for point in possible if (found := self._found(point).get((name, edge))) is not None]
-        rule, fit = EdgeRule("peak", 4.0), _RuleFit(2**62, 0, np.inf, np.inf)
-        if tried:
-            rules, outcomes = zip(*tried, strict=True)
-            k, fit = _best_of(outcomes, rules, edge, windows, len(self._truth[name]))
-            rule = rules[k]
-        labels_of = [name, None] if edge == 0 else [None, name]
-        how: dict[str, Any] = {"labels": labels_of, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
-        return _Best(fit, PlainRule(**rule._asdict(), **how))
+        possible = [rule for rule in grid if edge == 0 or rule.quantity not in CHANGES]
+        best = self._equal(self._fits(name, windows, self._table(name, edge, possible)), labels)
+        if best is None:
+            return _Best(_NONE, None)
+        rule, fit = best
+        names = [name, None] if edge == 0 else [None, name]
+        how: dict[str, Any] = {"labels": names, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
+        return _Best(fit, PlainRule(**rule._asdict(), constant_ms=float(f"{fit.constant_ms:.3g}"), **how))
 
-    def constant_ms(self, name: str) -> float:
-        """Return by how much the labels of a name are later than what was felt, ms; 0 where that is not so.
+    def _table(self, name: str, edge: int, rules: Iterable[EdgeRule]) -> _Table | None:
+        """Return what rules make of a label in all examples, of those better than nothing; None without any."""
+        found = {rule: one for rule in rules if (one := self._found(rule).get((name, edge))) is not None}
+        if not (each := list(found.values())):
+            return None
+        columns = (np.stack([one.error_ms for one in each]), np.stack([one.delay_ms for one in each]))
+        of = np.repeat(np.arange(len(each)), [len(one.false) for one in each])
+        return _Table(list(found), *columns, np.concatenate([one.false for one in each]), of)
 
-        Where rules miss or invent many, it is that of the begins or ends of loads of which most are within the window
-        once it is taken off; else it is that of touches, of a contact or lift, if it is more than the window.
+    def _fits(self, name: str, windows: NDArray[np.int64], table: _Table | None) -> list[tuple[EdgeRule, _RuleFit]]:
+        """Return how rules do in windows, of those that may be equal to the best, and are not known too late."""
+        fits: list[tuple[EdgeRule, _RuleFit]] = []
+        if table is None:
+            return fits
+        inside = within(self._truth[name], windows)
+        false = np.bincount(table.of[within(table.false, windows)], minlength=len(table.rules))
+        errors, delays = table.error_ms[:, inside], table.delay_ms[:, inside]
+        least = np.isnan(errors).sum(axis=1) + false
+        order, most = np.argsort(least, kind="stable"), np.inf
+        for k in range(0, len(order), _ROWS):
+            rows = order[k : k + _ROWS]
+            if least[rows[0]] > most:
+                break
+            for row, fit in zip(rows.tolist(), self._of_rows(errors[rows], delays[rows], false[rows]), strict=True):
+                if fit.delay_ms <= self._window_ms + self.loads.frame_ms:
+                    fits.append((table.rules[row], fit))
+                    most = min(most, fit.cost + fit.room(errors.shape[1]))
+        return fits
+
+    def _equal(self, tried: Sequence[tuple[EdgeRule, _RuleFit]], labels: int) -> tuple[EdgeRule, _RuleFit] | None:
+        """Return the preferred of the rules that are equal to the best for so many labels; None without any.
+
+        Of those of the preferred quantity count the ones that are known no later than a fifth of the window after the
+        first of them, and of these those whose mistakes differ by no more than `EQUAL_SHARE` of the labels. It is the
+        one with the most levels that do as well, at the level in the lower quarter of these.
         """
-        parts, true = self.loads.whole_examples, self._truth[name]
-        points = list(_points(self.loads, parts, None))
-        wrong = min(len(true), *(best.fit.wrong for best in self._at_edges(name, points, parts)))
-        named = {"contact": (0,), "lift": (1,)}.get(recipes.neuron_of("touch", name) or "")
-        are_many = many(wrong, len(true))
-        if len(true) < _LEAST or not self.loads.have_rest or not (are_many or named):
-            return 0.0
-        # Nearer to another label than to its own an edge says nothing.
-        reach_us = int(min(to_us(FAR_MS + _SAME_MS), np.median(np.diff(true)) / 2))
-        simple = [point for point in points if point.frames == 1 and not point.levels and point.quantity not in CHANGES]
-        window_ms, found = to_ms(self._width_us), [(len(true), np.inf, 0.0)]
-        for point, edge in product(simple if are_many else [self.loads.of_touches], named or (0, 1)):
-            edges = self.loads.edges(point)[edge]
-            pairs = tally(edges.t, edges.known, true, reach_us)
-            if pairs is None or len(pairs.detected) < _MOST * len(true):
-                continue
-            constant = -float(np.median(pairs.errors_ms))
-            off = np.abs(pairs.errors_ms + constant)
-            same, near = (int(np.count_nonzero(off <= ms)) for ms in (_SAME_MS, window_ms))
-            if same >= _MOST * len(true):
-                # What is felt of a label outside the window is missed, but nothing else is felt there.
-                found.append((len(true) - near + len(edges.t) - same, float(np.median(off)), constant))
-        left, _, constant = min(found)
-        few = max(_FEWER, round(_FEWER_SHARE * len(true)))
-        better = left <= wrong - few if are_many else left <= few and abs(constant) > window_ms
-        return constant if better and abs(constant) <= FAR_MS else 0.0
+        if not tried:
+            return None
+        best, least = min(tried, key=lambda one: one[1].cost)
+        alike: dict[EdgeRule, list[tuple[EdgeRule, _RuleFit]]] = {}
+        for rule, fit in tried:
+            if fit.cost <= least.cost + least.room(labels):
+                alike.setdefault(rule._replace(level=1.0), []).append((rule, fit))
+        first = min((_rank(rule) for rule, each in alike.items() if len(each) >= PLATEAU), default=_rank(best))
+        preferred = [each for rule, each in alike.items() if _rank(rule) == first]
+        late_ms = min(fit.delay_ms for each in preferred for _, fit in each) + self.off_ms
+        soon = [[one for one in each if one[1].delay_ms <= late_ms] for each in preferred]
+        most = min(fit.cost for each in soon for _, fit in each) + EQUAL_SHARE * labels
+        widest = max(([one for one in each if one[1].cost <= most] for each in soon), key=len)
+        widest.sort(key=lambda one: one[0].level)
+        return widest[(len(widest) - 1) // 4]
+
+    def _of_rows(
+        self, errors_ms: NDArray[np.float32], delays_ms: NDArray[np.float32], false: NDArray[np.int64]
+    ) -> Iterator[_RuleFit]:
+        """Yield how rules do by their errors, NaN of labels that they miss, once the median is taken off."""
+        constants_ms, known_ms = _medians(errors_ms), _medians(delays_ms)
+        apart = np.abs(errors_ms - constants_ms[:, None])
+        # Farther from its label than the window a detection is false, and the label missed.
+        far = np.count_nonzero(apart > self._window_ms, axis=1)
+        off = np.count_nonzero(apart > self.off_ms, axis=1) - far
+        wrong = np.count_nonzero(np.isnan(errors_ms), axis=1) + false + 2 * far
+        columns = (column.tolist() for column in (wrong, off, constants_ms, known_ms))
+        return map(_RuleFit, *columns)
+
+    def _found(self, rule: EdgeRule) -> dict[tuple[str, int], _Outcomes]:
+        """Return what a rule makes of each label at either edge; none where that is no better than nothing."""
+        if rule not in self._tried:
+            self._tried[rule] = {}
+            for edge, edges in enumerate(self.loads.edges(rule)):
+                found = edges.between(self._windows)
+                for name, true in self._truth.items():
+                    outcomes = _outcomes(found, true, self._width_us)
+                    if outcomes is not None:
+                        self._tried[rule][name, edge] = outcomes
+        return self._tried[rule]
 
     def detected(self, rule: PlainRule | None, label: str, part: Stretch) -> FoundTimes:
         """Return what the rule of a label detects of it in a part of an example, as `taxel.detect.run` finds it."""
@@ -280,234 +343,191 @@ class Tuning:
         if isinstance(rule.age_ms, str):
             edges = self.loads.at_end()
         elif rule.age_ms is None:
-            numbers = rule.quantity, rule.threshold, rule.release, rule.frames, rule.levels
-            edges = self.loads.edges(EdgeRule(*numbers, rule.dated_at, rule.of_largest))[label_index]
+            numbers = rule.quantity, rule.level, rule.release, rule.quiet_ms, rule.date, rule.levels
+            edges = self.loads.edges(EdgeRule(*numbers))[label_index]
+            edges = edges._replace(t=edges.t - round(float(to_us(rule.constant_ms))))
         else:
             edges = self.loads.at_age(rule.age_ms)
         found = self.loads.off(edges.between(self.loads.windows([part])), part[0])
         if rule.age_ms is None:
             return found
-        is_label = (found.value >= rule.threshold) == bool(label_index)
+        is_label = (found.value >= rule.level) == bool(label_index)
         return found._replace(t=found.t[is_label], known=found.known[is_label])
 
-    def _found(self, point: EdgeRule) -> dict[tuple[str, int], _Outcomes]:
-        """Return what a rule makes of each label at either edge; none where that is no better than nothing."""
-        if point not in self._outcomes:
-            self._outcomes[point] = {}
-            for edge, edges in enumerate(self.loads.edges(point)):
-                found = edges.between(self._windows)
-                for name, true in self._truth.items():
-                    outcomes = _outcomes(found, true, self._width_us)
-                    if outcomes is not None:
-                        self._outcomes[point][name, edge] = outcomes
-        return self._outcomes[point]
+    def _for_kinds(
+        self,
+        touches: Mapping[float | str, FoundTimes],
+        kinds: Sequence[str],
+        truth: Mapping[str, NDArray[np.int64]],
+    ) -> list[_Best] | None:
+        """Return the best rule that decides between two kinds by the area at an age, or by the duration, once for each.
 
-
-def _points(loads: Loads, parts: Sequence[Stretch], only: str | None) -> Iterator[EdgeRule]:
-    """Yield the grid, those that delay least first."""
-    if loads.have_rest:
-        # Channels have no local load, and their area shows edges no better than the peak.
-        quantities: tuple[str, ...] = (
-            ("peak", "total") if loads.are_channels else ("area", "total", "local_load", *CHANGES, "peak")
-        )
-        if only is not None:
-            quantities = (only,)
-        else:
-            quantities = tuple(quantity for quantity in quantities if quantity not in loads.labels_of)
-        totals = loads.values("total", parts) if "total" in quantities else np.empty(0)
-        thresholds = {"area": AREAS, "total": _ladder(totals), "peak": PEAKS}
-        thresholds |= dict.fromkeys(("local_load", *CHANGES), LOCAL_LOADS)
-        for quantity in quantities:
-            for threshold, frames, release in product(thresholds[quantity], FRAMES, RELEASES):
-                yield EdgeRule(quantity, threshold, release, frames)
-        for quantity in ("total", "peak"):
-            if quantity not in quantities or not loads.are_frames:
+        None without any.
+        """
+        times = np.concatenate([truth[name] for name in kinds])
+        order = np.argsort(times, kind="stable")
+        is_second = (np.arange(len(times)) >= len(truth[kinds[0]]))[order]
+        chosen: tuple[tuple[float, float], list[_Best]] | None = None
+        for age, (t, known, areas) in touches.items():
+            pairs = tally(t, known, times[order], self._width_us)
+            detected, events = (np.empty(0, np.int64),) * 2 if pairs is None else (pairs.detected, pairs.events)
+            second = is_second[events]
+            if second.all() or not second.any():
                 continue
-            for threshold, frames, release in product(thresholds[quantity][::2], FRAMES_OF_LARGEST, OF_LARGEST):
-                yield EdgeRule(quantity, threshold, release, frames, of_largest=True)
-    if loads.are_frames and only is None:
-        for quantity, levels in _levels(loads, parts):
-            yield from _counts(quantity, levels, loads.values(quantity, parts, levels))
+            level, flipped = _between(areas[detected], second)
+            below, above = reversed(kinds) if flipped else kinds
+            fits = {}
+            for name, is_kind in ((below, areas < level), (above, areas >= level)):
+                of_kind = FoundTimes(t[is_kind], known[is_kind], areas[is_kind])
+                one = _outcomes(of_kind, truth[name], self._width_us)
+                fits[name] = _NONE
+                if one is not None:
+                    [fits[name]] = self._of_rows(one.error_ms[None], one.delay_ms[None], np.array([len(one.false)]))
+            quantity = "duration" if age == "end" else "area"
+            how: dict[str, Any] = {"noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
+            rule = PlainRule(quantity, level, age_ms=age, labels=(below, above), **how)
+            best = [_Best(fits[name], rule) for name in kinds]
+            rank = (sum(one.fit.wrong for one in best), max(one.fit.delay_ms for one in best))
+            if chosen is None or rank < chosen[0]:
+                chosen = (rank, best)
+        return None if chosen is None else chosen[1]
+
+    def constant_ms(self, name: str) -> float:
+        """Return by how much the labels of a name are later than what was felt, ms; 0 where that is not so.
+
+        Where rules miss or invent many, it is that of the begins or ends of loads of which most are within the window
+        once it is taken off; else it is that of touches, of a contact or lift, if it is more than the window.
+        """
+        true = self._truth[name]
+        grid = list(_grid(self.loads, self.loads.whole_examples, None))
+        wrong = min(len(true), *(self._best_at(name, edge, self._windows, grid).fit.wrong for edge in (0, 1)))
+        named = {"contact": (0,), "lift": (1,)}.get(recipes.neuron_of("touch", name) or "")
+        are_many = many(wrong, len(true))
+        if len(true) < _FEWEST or not self.loads.have_rest or not (are_many or named):
+            return 0.0
+        # Nearer to another label than to its own an edge says nothing.
+        reach_us = int(min(to_us(FAR_MS + _SAME_MS), np.median(np.diff(true)) / 2))
+        simple = [point for point in grid if not point.quiet_ms and "load" in point.quantity]
+        found = [(len(true), np.inf, 0.0)]
+        for point, edge in product(simple if are_many else [self.loads.of_touches], named or (0, 1)):
+            edges = self.loads.edges(point)[edge]
+            pairs = tally(edges.t, edges.known, true, reach_us)
+            if pairs is None or len(pairs.detected) < _MOST * len(true):
+                continue
+            constant = -float(np.median(pairs.errors_ms))
+            off = np.abs(pairs.errors_ms + constant)
+            same, near = (int(np.count_nonzero(off <= ms)) for ms in (_SAME_MS, self._window_ms))
+            if same >= _MOST * len(true):
+                # What is felt of a label outside the window is missed, but nothing else is felt there.
+                found.append((len(true) - near + len(edges.t) - same, float(np.median(off)), constant))
+        left, _, constant = min(found)
+        few = max(_FEWER, round(_FEWER_SHARE * len(true)))
+        better = left <= wrong - few if are_many else left <= few and abs(constant) > self._window_ms
+        return constant if better and abs(constant) <= FAR_MS else 0.0
 
 
-def _ladder(totals: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return thresholds of the total, which are the same for most parts of the same data."""
-    totals = totals[totals > 0.0]
-    if not len(totals):
-        return ()
-    low, high = STEPS_A_DECADE * np.log10(np.quantile(totals, QUANTILES))
-    steps = np.arange(np.floor(low), np.ceil(high) + 1)
-    return tuple(float(f"{step:.3g}") for step in 10.0 ** (steps / STEPS_A_DECADE))
+def _grid(loads: Loads, parts: Sequence[Stretch], only: str | None) -> Iterator[EdgeRule]:
+    """Yield the rules of the first search, of all quantities or of one: fewer of those that do not count first."""
+    for quantity, levels in _quantities(loads, only):
+        is_first = only is not None or _rank(EdgeRule(quantity, 1.0, levels=levels)) < len(FIRST)
+        for level in _levels(quantity, loads.values(quantity, parts, levels), loads.noise_floor, 1 if is_first else 2):
+            ends = set()
+            for release in RELEASES if is_first else RELEASES[1::2]:
+                # Of whole numbers some releases are the same.
+                end = np.ceil(release * level) if quantity in _WHOLE else release
+                # Slow loads come to a high level late, and are dated before it.
+                dates = (None, (1.0 + release) / 2) if is_first and release < 1.0 else (None,)
+                for date, quiet_ms in product(dates, QUIETS_MS) if end not in ends else ():
+                    yield EdgeRule(quantity, level, release, quiet_ms, date, levels)
+                ends.add(end)
 
 
-def _levels(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Yield the quantities with levels that are tried."""
-    readings = loads.readings(parts) if loads.have_rest else np.empty(0)
-    if len(readings):
-        if loads.unit in LEVELS:
-            yield "count", LEVELS[loads.unit]
-        # On the ladder it is the same for most parts of the same data.
-        steps = np.rint(STEPS_A_DECADE * np.log10(np.quantile(readings, QUANTILES[1])))
-        most = 10.0 ** (steps / STEPS_A_DECADE)
-        yield "count", tuple(float(f"{share * most:.2g}") for share in LEVEL_SHARES)
-    yield "range_count", LEVEL_SHARES
+def _quantities(loads: Loads, only: str | None) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield the quantities that examples allow, with the levels of a count; or one."""
+    if only is not None:
+        yield only, ()
+        return
+    if loads.are_frames:
+        yield "range_load", ()
+    if not loads.have_rest:
+        return
+    is_of_load = "load" in loads.labels_of
+    if not is_of_load:
+        if loads.taxels >= SPARE:
+            yield "load_without_largest", ()
+        yield "load", ()
+    if loads.taxels > 1 and len(loads.readings):
+        most = float(np.quantile(loads.readings, MOST))
+        least = LEAST_SHARE * most if loads.are_channels else float(loads.readings.min())
+        yield "count", tuple(sorted(_snapped(np.geomspace(least, most, LEVELS))))
+        yield "moved", ()
+    for quantity in ("rise", "fall"):
+        yield quantity, ()
     # Few channels begin a touch one by one.
-    if loads.have_rest and not loads.are_channels:
+    if not loads.are_channels:
+        for quantity in ("local_load", "local_rise", "local_fall"):
+            yield quantity, ()
         for level in BEGIN_LEVELS_MS:
             yield "begin_area", (level,)
 
 
-def _counts(quantity: str, levels: tuple[float, ...], counts: NDArray[np.float64]) -> Iterator[EdgeRule]:
-    """Yield rules of a count: rise to n after at most r, or fall to r after at least n, dated at a number between."""
-    most = counts.max(initial=0.0)
-    for n in COUNTS:
-        if n > most:
-            return
-        for r in sorted({int(part * n) for part in COUNT_RELEASES} | {n - 1}):
-            for dated_at in sorted({int(at) for at in np.linspace(r + 1, n, min(DATES, n - r))}, reverse=True):
-                yield EdgeRule(quantity, n, (r + 0.5) / n, levels=levels, dated_at=float(dated_at))
+def _levels(quantity: str, values: NDArray[np.float64], floor: float, every: int) -> list[float]:
+    """Return the levels of a quantity that are tried, ascending: all, or every so many."""
+    least = 1.0 if quantity in _WHOLE else _LEAST.get(quantity, floor)
+    loaded = values[(values >= least) & (values > 0.0)]
+    if not len(loaded):
+        return []
+    steps = np.geomspace(least or float(loaded.min()), float(loaded.max()), STEPS)[::every]
+    quantiles = np.quantile(loaded, (np.arange(QUANTILES) + 0.5) / QUANTILES)[::every]
+    levels = np.concatenate([steps, quantiles])
+    if quantity in _WHOLE:
+        return [float(level) for level in np.unique(np.rint(levels)) if level >= 1.0]
+    return sorted(_snapped(levels))
+
+
+def _snapped(levels: NDArray[np.float64]) -> set[float]:
+    """Return levels on a ladder, so that they are the same for most parts of the same data."""
+    return {float(f"{10.0**step:.3g}") for step in np.rint(LADDER * np.log10(levels)) / LADDER}
+
+
+def _rank(rule: EdgeRule | PlainRule | None) -> int:
+    """Return the place of a rule where others are equal."""
+    return next((k for k, names in enumerate(FIRST) if rule is not None and rule.quantity in names), len(FIRST))
 
 
 def _outcomes(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _Outcomes | None:
-    """Return what detections make of labels; None where they are no better than none."""
-    t = found.t
-    if not len(true) or abs(len(t) - len(true)) >= len(true):
+    """Return what detections make of labels; None where they are no better than none, or half as many more or fewer."""
+    if not len(true) or 2 * abs(len(found.t) - len(true)) >= len(true):
         return None
-    pairs = tally(t, found.known, true, width_us)
+    pairs = tally(found.t, found.known, true, width_us)
     assert pairs is not None
-    missed, false = pairs.missed_events, pairs.false_detections
-    if len(missed) + len(false) >= len(true):
+    if pairs.wrong >= len(true):
         return None
-    lost = np.full(len(missed), np.nan), np.full(len(false), np.inf)
-    errors, delays = (np.abs(ms) for ms in (pairs.errors_ms, pairs.delays_ms))
-    return _Outcomes(
-        np.concatenate([true[pairs.events], true[missed], t[false]]),
-        np.concatenate([errors, *lost]).astype(np.float32),
-        np.concatenate([delays, *lost]).astype(np.float32),
-    )
-
-
-def _best_of(
-    several: Sequence[_Outcomes],
-    points: Sequence[EdgeRule],
-    edge: int,
-    windows: NDArray[np.int64],
-    labels: int,
-) -> tuple[int, _RuleFit]:
-    """Return the place of the best rule in windows on the one clock, which ascend and have so many labels.
-
-    Of thresholds alike in all else that are equally right it is the middle one: farthest from noise, and from what
-    weaker loads reach.
-    """
-    rule = np.repeat(np.arange(len(several)), [len(outcomes.t) for outcomes in several])
-    t, errors, delays = (np.concatenate(column) for column in zip(*several, strict=True))
-    inside = within(t, windows)
-    rule, errors, delays = rule[inside], errors[inside], delays[inside]
-    found = np.isfinite(errors)
-    wrong, near = (np.bincount(rule[of], minlength=len(several)) for of in (~found, errors <= to_ms(NEAR_US)))
-    equal = np.flatnonzero(wrong <= wrong.min() + EQUAL_SHARE * labels)
-    equal = equal[near[equal] >= near[equal].max() - 1 - EQUAL_SHARE * labels]
-    rule, errors, delays = rule[found], errors[found], delays[found]
-    stops = np.searchsorted(rule, np.arange(len(several)), side="right")
-
-    def median(of: NDArray[np.float32], k: int) -> float:
-        return _median(of[stops[k - 1] if k else 0 : stops[k]])
-
-    def nearest(several: Sequence[int]) -> int:
-        most = max(near[k] for k in several)
-        return min((k for k in several if near[k] == most), key=lambda k: (median(delays, k), k))
-
-    best = nearest(equal.tolist())
-    alike = [k for k in equal.tolist() if k == best or _are_alike(points[k], points[best], edge)]
-    thresholds = sorted({points[k].threshold for k in alike})
-    middle = thresholds[(len(thresholds) - 1) // 2]
-    best = nearest([k for k in alike if points[k].threshold == middle])
-    return best, _RuleFit(int(wrong[best]), int(near[best]), median(delays, best), median(errors, best))
-
-
-def _are_alike(one: EdgeRule, other: EdgeRule, edge: int) -> bool:
-    """Whether rules differ only in their thresholds, which tell noise from loads, but not when a load begins or ends.
-
-    Of a count that is so at ends: from which number it falls, and with it which dates are tried.
-    """
-    if not one.levels:
-        return other == one._replace(threshold=other.threshold)
-    are_of_one_count = (one.quantity, one.levels) == (other.quantity, other.levels)
-    return (
-        edge == 1
-        and are_of_one_count
-        and round(one.threshold * one.release, 1) == round(other.threshold * other.release, 1)
-    )
+    errors, delays = np.full((2, len(true)), np.nan, np.float32)
+    errors[pairs.events], delays[pairs.events] = pairs.errors_ms, pairs.delays_ms
+    return _Outcomes(errors, delays, np.delete(found.t, pairs.detected))
 
 
 def _is_onset(onset: _Best, end: _Best) -> bool:
     """Whether a label is that of the begin of a load; a load that falls begins where one ends."""
-    return onset.fit.error_ms < end.fit.error_ms and onset.rule.quantity != "local_fall"
+    is_fall = onset.rule is not None and onset.rule.quantity in ("fall", "local_fall")
+    return abs(onset.fit.constant_ms) < abs(end.fit.constant_ms) and not is_fall
 
 
-def _better(pair: tuple[_Best, _Best], labels: int) -> _Best:
-    """Return the better of two rules for so many labels; the first where they are equal."""
-    least = min(tuned.fit.wrong for tuned in pair)
-    equal = [tuned for tuned in pair if tuned.fit.wrong <= least + EQUAL_SHARE * labels]
-    return min(equal, key=lambda tuned: (-tuned.fit.near, tuned.fit.delay_ms))
-
-
-def _median(values: NDArray[np.floating[Any]]) -> float:
-    """Return the median; infinite without any. NumPy's takes ten times as long, and tens of thousands are asked for."""
-    ordered, count = np.sort(values), len(values)
-    return float((ordered[(count - 1) // 2] + ordered[count // 2]) / 2) if count else np.inf
-
-
-def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _RuleFit:
-    """Return how detections fit labels."""
-    pairs = tally(found.t, found.known, true, width_us)
-    if pairs is None:
-        return _RuleFit(0, 0, np.inf, np.inf)
-    wrong = len(pairs.missed_events) + len(pairs.false_detections)
-    errors, delays = np.abs(pairs.errors_ms), np.abs(pairs.delays_ms)
-    return _RuleFit(wrong, int(np.count_nonzero(errors <= to_ms(NEAR_US))), _median(delays), _median(errors))
-
-
-def _for_kinds(
-    touches: Mapping[float | str, FoundTimes],
-    kinds: Sequence[str],
-    truth: Mapping[str, NDArray[np.int64]],
-    width_us: int,
-    floor: float,
-    unit: str | None,
-) -> list[_Best] | None:
-    """Return the best rule that decides between two kinds by the area at an age, or by the duration, once for each.
-
-    None without any.
-    """
-    times = np.concatenate([truth[name] for name in kinds])
-    order = np.argsort(times, kind="stable")
-    is_second = (np.arange(len(times)) >= len(truth[kinds[0]]))[order]
-    chosen: tuple[tuple[int, float], list[_Best]] | None = None
-    for age, (t, known, areas) in touches.items():
-        pairs = tally(t, known, times[order], width_us)
-        detected, events = (np.empty(0, np.int64),) * 2 if pairs is None else (pairs.detected, pairs.events)
-        second = is_second[events]
-        if second.all() or not second.any():
-            continue
-        threshold, flipped = _between(areas[detected], second)
-        below, above = reversed(kinds) if flipped else kinds
-        fits = {}
-        for name, is_kind in ((below, areas < threshold), (above, areas >= threshold)):
-            fits[name] = _fit(FoundTimes(t[is_kind], known[is_kind], areas[is_kind]), truth[name], width_us)
-        quantity = "duration" if age == "end" else "area"
-        rule = PlainRule(quantity, threshold, age_ms=age, labels=(below, above), noise_floor=floor, unit=unit)
-        best = [_Best(fits[name], rule) for name in kinds]
-        rank = (sum(tuned.fit.wrong for tuned in best), max(tuned.fit.delay_ms for tuned in best))
-        if chosen is None or rank < chosen[0]:
-            chosen = (rank, best)
-    return None if chosen is None else chosen[1]
+def _medians(values: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the median of each row without its NaN; infinite without any."""
+    ordered, count = np.sort(values, axis=1).astype(np.float64), np.count_nonzero(~np.isnan(values), axis=1)
+    rows, last = np.arange(len(values)), np.maximum(count - 1, 0)
+    if not values.shape[1]:
+        return np.full(len(values), np.inf)
+    middle = (ordered[rows, last // 2] + ordered[rows, np.minimum(count // 2, last)]) / 2
+    return np.where(count > 0, middle, np.inf)
 
 
 def _between(areas: NDArray[np.float64], second: NDArray[np.bool_]) -> tuple[float, bool]:
-    """Return the threshold on log area with the fewest on its wrong side, and whether the second kind is below it.
+    """Return the level on log area with the fewest on its wrong side, and whether the second kind is below it.
 
-    If thresholds are equal, the one in the widest gap counts; an area of 0 counts as .5.
+    If levels are equal, the one in the widest gap counts; an area of 0 counts as .5.
     """
     order = np.argsort(areas, kind="stable")
     logs, ones = np.log(np.maximum(areas[order], 0.5)), second[order]

@@ -21,12 +21,11 @@ class Peak(Tared):
     depends neither on position nor on neighbours: one loaded taxel is a touch, and channels have a peak too. A stuck
     taxel that moves also counts as a touch; `LocalLoad` and `ContactArea` reject it.
 
-    The rest begins at the tare and follows each taxel's value, as in `LocalLoad`. A taxel that has been 0 since
-    the first sample has no value yet and counts as at rest; a taxel without a value in the tare is left out.
+    A taxel that has been 0 since the first sample has no value yet and counts as at rest; a taxel without a value in
+    the tare is left out.
 
     Trains are unsigned: first one per level, which fires when the peak rises to it, then one per level, which fires
-    when the peak falls below `release` x level. They are computed once for each stamp, after the last event with it,
-    and as the rest moves.
+    when the peak falls below `release` x level. They are computed once for each stamp, after the last event with it.
 
     Parameters
     ----------

@@ -67,6 +67,9 @@ class Live:
         a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
         on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at
         0.
+    absorb_s : float, s, 0 to 1800, optional
+        After how many seconds a load that stays becomes rest, in frames of numbers, whose rest follows drift; 0: the
+        rest stays as it was measured. Default: as in the training.
     record : path, optional
         Record in a new .mcap file.
     record_later : bool
@@ -277,7 +280,9 @@ class Live:
         `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured, as where the
         kernel does not stamp arrivals), `offset` (board_us, host_ns,
         drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or
-        None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
+        None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`,
+        `left_floor` (of frames whose rest has left the noise floor of the training: since_us, and how many taxels'
+        at most; else None).
 
         Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
         `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +

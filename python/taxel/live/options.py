@@ -65,6 +65,13 @@ class LiveOptions:
         metavar="FILE|SECONDS",
         typed="A recording of the sensor at rest (taxel cut) can be used instead of a saved tare.",
     )
+    absorb_s: float | None = option(
+        None,
+        "After how many seconds a load that stays becomes rest, in frames of numbers, whose rest follows drift; 0: the "
+        "rest stays as it was measured. Default: as in the training.",
+        least=0,
+        most=1800,
+    )
     record: str | os.PathLike[str] | None = option(None, "Record in a new .mcap file.")
     record_later: bool = option(
         False, "Let `record` and `end_recording` begin and end recordings while the `Live` runs.", commands=""
@@ -128,6 +135,7 @@ class LiveOptions:
         readout, array, registers = self.readout, self.array, self.registers
         if readout is not None:
             detector("readout", readout)
+            readout = readout.absorbing(self.absorb_s)
         if array is None and readout is not None:
             array = readout.array
         elif readout is not None and readout.array is not None:
@@ -170,7 +178,7 @@ class LiveOptions:
 
 
 #: Options that are passed in another form, as the name of a file may be no text, or not at all.
-_APART = ("record", "send", "sources", "first_line_s", "say")
+_APART = ("absorb_s", "record", "send", "sources", "first_line_s", "say")
 
 
 def _plain(option: Field[Any], value: object) -> object:

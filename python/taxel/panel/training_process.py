@@ -10,7 +10,7 @@ standard output::
     {"type": "error", "kind": "ProblemError", "text": "walk.mcap: ..."}
 
 Progress comes before each step; `of` is 0 where it is not known. The result is that of `Training.to_dict`, with its
-lines for people, the command that detects by the readout, and the two pictures of its report. The exit code is 0, 2
+lines for people, the command that detects by the readout, and the picture of its report. The exit code is 0, 2
 after an error, and 130 of a training that was stopped, which writes no last line and leaves no file.
 """
 
@@ -75,15 +75,10 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
 
 
 def _pictures(training: Training) -> Iterator[dict[str, str]]:
-    """Yield the pictures of labels beside detections, and of loads beside those of the training."""
-    readout, listened = training.readout, training.outcomes
+    """Yield the picture of labels beside detections, where there is one."""
     with mpl.rc_context(STYLE):
-        for title, figure in (
-            ("Each nearest detection minus its label, over time", compared.nearest(listened, readout.labels)),
-            ("Loads of this recording beside those of the training", compared.beside_training(readout, listened)),
-        ):
-            if figure is not None:
-                yield {"title": title, "svg": image(figure)}
+        if (figure := compared.nearest(training.outcomes, training.readout.labels)) is not None:
+            yield {"title": "Each nearest detection minus its label, over time", "svg": image(figure)}
 
 
 def _say(line: Mapping[str, Any]) -> None:

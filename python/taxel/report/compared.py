@@ -1,16 +1,15 @@
-"""Two pictures of a report: nearest detections beside their labels over time, and loads beside the training's."""
+"""A picture of a report: nearest detections beside their labels over time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import pyplot as plt
 
 from taxel._base.messages import escaped
-from taxel.detect import Outcome, PlainRule, Readout, drift
-from taxel.detect.examples import check_examples
+from taxel.detect import Outcome
 from taxel.report.svg import DETECTED, TRUE
 
 if TYPE_CHECKING:
@@ -18,14 +17,6 @@ if TYPE_CHECKING:
 
 #: Recordings whose labels are drawn, and how far a label and its nearest detection are drawn apart at most, ms.
 _MOST, _FAR_MS = 4, 2000.0
-#: What is measured of loads, with the sensor's unit.
-_NAMES = {
-    "peak": "peak, times the noise",
-    "sum": "sum, {}",
-    "taxels": "loaded taxels",
-    "lasts_ms": "lasts, ms",
-    "apart_ms": "from begin to begin, ms",
-}
 
 
 def nearest(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
@@ -53,28 +44,4 @@ def nearest(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None
         if axis.get_legend_handles_labels()[0]:
             axis.legend(loc="upper right", fontsize="small")
     axes[-1, 0].set_xlabel("time, s")
-    return figure
-
-
-def beside_training(readout: Readout | PlainRule, listened: Sequence[Outcome]) -> Figure | None:
-    """Draw the share of loads up to each value of a feature, a curve of the training and one of the recordings."""
-    data: Mapping[str, Any] = readout._parts.get("training") or {}
-    examples = check_examples([outcome.example for outcome in listened])
-    features = {
-        name: np.sort(values) for name, values in drift.of_loads(examples, data.get("noise_floor", 0.0)).items()
-    }
-    shown = [name for name in data.get("loads", {}) if len(features.get(name, ()))]
-    if not shown:
-        return None
-    figure, axes = plt.subplots(2, 3, figsize=(9.0, 4.0), layout="constrained")
-    for axis, name in zip(axes.ravel(), shown, strict=False):
-        then = np.asarray(data["loads"][name]["values"])
-        axis.plot(then, np.linspace(0.0, 1.0, len(then)), color=TRUE, label="training")
-        here = features[name]
-        axis.step(here, np.arange(1, len(here) + 1) / len(here), where="post", color=DETECTED, label="here")
-        axis.set_xlabel(_NAMES[name].format(escaped(readout.unit or "")))
-    for axis in axes.ravel()[len(shown) :]:
-        axis.set_axis_off()
-    axes[0, 0].set_ylabel("share")
-    axes[0, 0].legend(fontsize="small")
     return figure

@@ -104,9 +104,8 @@ def write_detections(
     moments = {label: _moments(listened, label) for label in labels}
     with mpl.rc_context(STYLE):
         first = [] if touch is None else _pictures(of_touch(listened[0], *touch))
-        compared_with = [compared.nearest(listened, labels), compared.beside_training(readout, listened)]
         drawn = {label: _pictures(_of_label(readout, listened, label, moments[label])) for label in labels}
-        nearest, beside_training = ([*_pictures([figure])] for figure in compared_with)
+        nearest = _pictures([compared.nearest(listened, labels)])
     text = render(
         "report/listening.html.j2",
         title=title,
@@ -118,7 +117,6 @@ def write_detections(
         printed=printed,
         tables=_tables(listened, labels, held_out, scored),
         nearest=nearest,
-        beside_training=beside_training,
         worst=[
             (moment.outcome.name, label, (moment.t - moment.outcome.begin_us) / 1e6, moment.what)
             for label in labels

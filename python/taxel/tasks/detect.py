@@ -17,12 +17,13 @@ from taxel._base.messages import collected, counted, warn
 from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, recipes, score
-from taxel.detect.board import differences, noise_floor, other_frames
+from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
+from taxel.detect.board import differences, other_frames
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
-from taxel.detect.examples import check_examples, unreliable
-from taxel.detect.readout import rest_for, run
+from taxel.detect.drift import left_line
+from taxel.detect.examples import unreliable
+from taxel.detect.readout import rest_for, run_watched
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -214,7 +215,7 @@ def detect(
     """
     detector("readout", readout)
     options = DetectOptions() if options is None else instance("options", options, DetectOptions)
-    readout = _used(readout, options.use)
+    readout = _used(readout, options.use).absorbing(options.absorb_s)
     update = reporting(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:
@@ -243,10 +244,7 @@ def detect(
         together = _score_of(scored, options.window_ms) if scored else None
         if together is not None and together.events and many_wrong(together):
             data = readout._parts.get("training") or {}
-            sound = check_examples([outcome.example for outcome in scored])
-            floors = [data.get("noise_floor", 0.0), *(noise_floor(outcome.example.source) for outcome in scored)]
-            drifted = drift.lines(data, drift.of_loads(sound, max(floors)))
-            for line in (off_detections(scored, data.get("error_ms", {})) + drifted)[:_LINES]:
+            for line in off_detections(scored, data.get("error_ms", {}))[:_LINES]:
                 warn(line, stacklevel=2)
     unknown = sorted({label for labels_of in events for label in labels_of} - set(readout.labels))
     for label in unknown:
@@ -315,7 +313,10 @@ def _detected(readout: Readout | PlainRule, known: Sequence[str], options: Detec
         _check_unit(readout, recording)
         taken = rest_for(readout, recording, options.tare)
         tare, begin_us = (None, None) if taken is None else (taken._needed(recording), taken.detect_from_us)
-        found = run(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
+        found, left = run_watched(readout, recording, options.frame_us, tare, begin_us=begin_us)
+    if left is not None:
+        begin_us = 0 if taken is None else taken.begin_us
+        warn(f"{recording.title}: {left_line(readout, *left, begin_us)}", stacklevel=3)
     # Labels that the readout does not have do not count as missed.
     true = {} if labels is None else {label: labels.get(label, _NONE) for label in known}
     title = recording.title

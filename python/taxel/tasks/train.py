@@ -17,8 +17,7 @@ from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, Recipe, recipes, score
 from taxel.detect.board import of_training
 from taxel.detect.clock import beside_loads, exchanged, off_loads
-from taxel.detect.drift import training_data
-from taxel.detect.examples import check_examples, sizes_of
+from taxel.detect.examples import sizes_of
 from taxel.detect.fit import Fitter
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import count_of_folds
@@ -137,7 +136,11 @@ def _train(
     assert plan is not None
     registers = opened[0].registers
     frame_us = None if registers is None else registers.frame_us
-    fitter_of = partial(Fitter, recipe=plan, window_ms=options.window_ms, frame_us=frame_us, progress=update)
+    # A rest would follow values that fall within half a second.
+    absorb_s = 0.0 if options.absorb_s is None and any(taken.falls for taken in rests) else options.absorb_s
+    fitter_of = partial(
+        Fitter, recipe=plan, window_ms=options.window_ms, frame_us=frame_us, absorb_s=absorb_s, progress=update
+    )
     fitter = fitter_of(examples)
     if constants := _constants(fitter, update):
         examples = [
@@ -152,7 +155,7 @@ def _train(
     try:
         training = _trained(opened, examples, rests, options, fitter, constants, update, workers)
     except ProblemError as error:
-        if off := off_loads(check_examples(examples)):
+        if off := off_loads(fitter.examples):
             error.args = (f"{error.args[0]}; {off[0]}", *error.args[1:])
         raise
     # Where many labels are missed or false, it is said by how much they are off what was felt.
@@ -160,7 +163,7 @@ def _train(
         missed = {
             label for label, of_label in training.score.by_label.items() if 2 * of_label.missed >= of_label.events
         }
-        lines = off_loads(check_examples(examples), missed) or list(_mistaken(training))
+        lines = off_loads(fitter.examples, missed) or list(_mistaken(training))
         for line in [*lines, *(line for recording in opened for line in sensor_lines(recording))][:_LINES]:
             warn(line)
     return replace(training, unlabelled=unlabelled, constants_ms=constants)
@@ -311,7 +314,7 @@ def _trained(
         scored = judge_training(fitter, trained._replace(readout=by_halves))
     rules = {label: rule for label, rule in scored.plain.rules.items() if rule is not None}
     readout = trained.readout._with_rules(rules, scored.by_rule)
-    data = training_data(fitter.examples, scored.together, of_training(examples))
+    data = of_training(examples, scored.together, fitter.noise_floor)
     readout = readout._with(training=data | {"constants_ms": dict(constants)})
     outcomes = []
     for recording, example in zip(opened, examples, strict=True):

@@ -36,7 +36,7 @@ def knows(path: Path) -> bool:
 
 def read(path: Path, _layout: Any = None) -> list[InMemory]:
     """Return a reader of each foot, for `taxel.open`."""
-    return readers(path, "gaitpdb", trials(path), labels_of="total")
+    return readers(path, "gaitpdb", trials(path), labels_of="load")
 
 
 def trials(path: Path) -> Iterator[Trial]:

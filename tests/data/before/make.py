@@ -156,7 +156,7 @@ def texts() -> None:
     rest = Frames(np.full((3, 4, 4), 20.0) + np.arange(3)[:, None, None], [0, 500, 1000], unit="ticks", array=SMALL)
     tare = Tare.take(rest, note="board 7, 2026-11-26")
     tare.save(HERE / "tare.json")
-    PlainRule("total", 30, 0.5, 5, labels=("on", "off")).save(HERE / "rule.json")
+    PlainRule("load", 30, 0.5, 5.0, labels=("on", "off")).save(HERE / "rule.json")
     neuron = Neuron(tau=2.0, refractory=15.0)
     encoder = Composite({"area": ContactArea(levels=[2, 4]), "fa1": FA1()})
     neurons = {

@@ -2,6 +2,7 @@
 
 use crate::detect::{Detection, FrameTime, PlainRule, Readout, ReadoutStream, file};
 use crate::encode::{Tare, Zeroing};
+use crate::rest::LeftFloor;
 use crate::{Array, EventsView, FramesView, Result, Stop, problem};
 
 /// The time that a recording is continued after its last event or frame, us: longer than any input can keep a
@@ -153,7 +154,7 @@ impl Detector {
         Ok(found)
     }
 
-    /// The detections of a whole recording of frames with taxels that a person zeroed, continued for a second with the
+    /// The detections of a whole recording of frames, and since when what is at rest is outside its noise floor, with taxels that a person zeroed, continued for a second with the
     /// last frame. Frames last `frame_us`, or by default
     /// the median distance between frames. Nothing is detected before `begin` us: of the frames before it, at rest, only
     /// the last one is read.
@@ -170,7 +171,7 @@ impl Detector {
         zeroings: &[Zeroing],
         begin: Option<i64>,
         stop: Stop<'_>,
-    ) -> Result<Vec<Detection>> {
+    ) -> Result<(Vec<Detection>, Option<LeftFloor>)> {
         let frame_us = match frame_us {
             Some(frame_us) => frame_us,
             None => usual_distance(frames.t)?,
@@ -184,7 +185,7 @@ impl Detector {
         let rest = FramesView { t: &frames.t[first..], values: &frames.values[first * frames.array.len()..], ..frames };
         let mut found = stream.push_frames(rest, stop)?;
         stream.finish(last, &mut found)?;
-        Ok(found)
+        Ok((found, stream.left_floor()))
     }
 }
 

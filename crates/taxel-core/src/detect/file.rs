@@ -5,8 +5,8 @@ use serde_json::Value;
 
 use crate::{Error, Result, problem, reading};
 
-/// The version of each format that is written; there is no other so far.
-const VERSION: u64 = 1;
+/// The version of each format that is written and read. Rules of version 1 had thresholds, frames and other quantities.
+const VERSION: u64 = 2;
 
 /// Reads the text of a file of one of `formats`; returns the format and the other contents.
 ///
@@ -29,6 +29,9 @@ pub(super) fn parts(name: &str, text: &str, formats: &[&'static str]) -> Result<
     };
     match object.remove("version") {
         Some(version) if version.as_u64() == Some(VERSION) => Ok((name, value)),
+        Some(version) if version.as_u64() == Some(1) => {
+            Err(format(format!("was written by an earlier taxel: train again; version is 1, must be {VERSION}")))
+        }
         Some(version) => Err(format(format!("version is {version}; this taxel reads only version {VERSION}"))),
         None => Err(format(format!("the key \"version\" is missing; must be {VERSION}"))),
     }

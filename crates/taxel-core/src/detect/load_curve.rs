@@ -1,7 +1,7 @@
 //! A quantity over a whole recording, on which many plain rules are tried without encoding it again.
 
 use crate::detect::detector::{SILENCE_US, usual_distance};
-use crate::detect::running_rule::{Decision, EdgeNumbers, Limits, RunningRule, When};
+use crate::detect::running_rule::{Decision, EdgeNumbers, Limits, RunningRule};
 use crate::detect::{FrameClock, FrameTime};
 use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
@@ -10,7 +10,7 @@ use crate::{EventsView, FramesView, Result, Spike, Stop, problem};
 /// The number of events, or of frames, between two checks of [`Stop`].
 const PIECE: usize = 16_384;
 
-/// How long after the silence that follows a recording a quantity is computed, us: so far its frames or age may reach.
+/// How long after the silence that follows a recording a quantity is computed, us: so far its quiet time or age may reach.
 const LONGEST_REACH_US: i64 = 10_000_000;
 
 /// The changes of a quantity in a recording.
@@ -113,19 +113,16 @@ impl LoadCurve {
     #[must_use]
     pub fn edges(&self, edges: &EdgeNumbers) -> Vec<Decision> {
         let limits = Limits::at_edges(edges);
-        if limits.follows {
-            return self.run(limits, self.changes.iter());
-        }
         // Begins and ends depend only on which limits the quantity has passed, and it changes far more often than that.
-        let mut last = limits.passed_limits(0.0);
+        let mut last = None;
         let passing = self.changes.iter().filter(|change| {
-            let before = std::mem::replace(&mut last, limits.passed_limits(f64::from(change.value)));
-            before != last
+            let passed = Some(limits.passed_limits(f64::from(change.value)));
+            std::mem::replace(&mut last, passed) != passed
         });
         self.run(limits, passing)
     }
 
-    /// The area at an age of every touch, as it is compared with a [`PlainRule`](crate::detect::PlainRule)'s threshold.
+    /// The area at an age of every touch, as it is compared with a [`PlainRule`](crate::detect::PlainRule)'s level.
     ///
     /// # Errors
     ///
@@ -135,7 +132,7 @@ impl LoadCurve {
     }
 
     /// Every touch as it ends, with its duration, ms, as it is compared with a
-    /// [`PlainRule`](crate::detect::PlainRule)'s threshold.
+    /// [`PlainRule`](crate::detect::PlainRule)'s level.
     ///
     /// # Errors
     ///
@@ -156,9 +153,7 @@ impl LoadCurve {
 
     fn run<'a>(&self, limits: Limits, changes: impl Iterator<Item = &'a Spike>) -> Vec<Decision> {
         let (mut rule, mut clock, mut out) = (RunningRule::new(limits), self.clock, vec![]);
-        let reach = (limits.frames as f64 * self.period_us).ceil() as i64
-            + if let When::AtAge(age) = limits.when { age } else { 0 };
-        let end = self.last + SILENCE_US + reach;
+        let end = self.last + SILENCE_US + self.period_us.ceil() as i64 + limits.reach();
         let mut changes = changes.take_while(|change| us(change.t) < end as f64).peekable();
         for &t in &self.frame_times {
             rule.advance(t, &clock, &mut out);

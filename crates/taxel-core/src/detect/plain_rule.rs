@@ -1,4 +1,4 @@
-//! A detector without training: a load above a threshold for some frames.
+//! A detector without training: a load at a level.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -8,17 +8,15 @@ use crate::detect::running_rule::{EdgeNumbers, Limits, RunningRule};
 use crate::detect::stream::Way;
 use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainingData, file};
 use crate::encode::{Quantity, Tare};
+use crate::rest::Following;
 use crate::spikes::us;
 use crate::{Array, Result, problem, reading};
 
 #[cfg(test)]
 mod tests;
 
-/// The largest number of frames in a row.
-const MOST_FRAMES: u32 = 1_000_000;
-
-/// The latest age at which a rule may decide, ms.
-const LATEST_AGE_MS: f64 = 60_000.0;
+/// The latest age at which a rule may decide, the longest quiet time and the largest constant, ms.
+const LONGEST_MS: f64 = 60_000.0;
 
 /// The age of a touch at which a rule decides.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,44 +36,39 @@ pub enum NamedAge {
     End,
 }
 
-/// A load above a threshold for some frames, with a label for its onset and one for its end.
+/// A load at a level, with a label for its onset and one for its end.
 ///
-/// The sensor is loaded from the first of `frames` frames in a row in which the quantity is at least the threshold, to
-/// the first of `frames` frames in a row in which it is below `release` times the threshold. A detection's `t` is the
-/// time of the first of these frames; it is `known` when the last one is complete. A frame's quantity is that after its
-/// last event; its time is the stamp with which the quantity passed the threshold. A frame of the input is one frame.
-///
-/// A quantity with levels thus rises to n after it was at most r with the threshold n and the release (r + 1) / n, and falls to r after it
-/// was at least n. With `dated_at` `t` is when the quantity last rose to that value, or fell below it; what the rule detects,
-/// and when it is known, stay the same. With `of_largest` the load ends where the quantity is below `release` times its
-/// largest value since the begin, and both it and the threshold are above a rest, which is 0 at first, follows the quantity
-/// down while nothing is loaded, and is where the quantity was as a load ended.
+/// The sensor is loaded from the first frame in which the quantity is at least the level, until it has been below `release`
+/// times the level for `quiet_ms`; the first values show whether it is loaded at first. A detection's `t` is when the
+/// quantity came to the level, or below `release` times it, or with a date when it last rose to `date` times the level, or
+/// fell below that; `constant_ms` is taken off. It is `known` when the frame is complete in which the load begins, or that
+/// holds at the end of the quiet time. A frame's quantity is that after its last event; its time is the stamp with which the
+/// quantity passed the level. A frame of the input is one frame.
 ///
 /// With an age it decides once a touch. A touch begins with the first frame in which the area is 2 taxels or more, and
 /// ends with the first in which it is less. The label is that of the quantity in the frame that holds at the age after
-/// the touch's begin, below the threshold or not; `t` is the begin, and `known` the end of that frame. At the end of a touch
+/// the touch's begin, below the level or not; `t` is the begin, and `known` the end of that frame. At the end of a touch
 /// it is that of its duration, and `known` the end of the frame in which the touch ends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlainRule {
-    /// What is compared with the threshold.
+    /// What is compared with the level.
     pub quantity: Quantity,
-    /// The threshold, above 0: taxels, units of noise, or the sensor's unit.
-    pub threshold: f64,
-    /// The part of the threshold below which the load ends, above 0, at most 1; 1 with an age.
+    /// The level, above 0: taxels, units of noise, shares of ranges, ms, or the sensor's unit.
+    pub level: f64,
+    /// The part of the level below which the load ends, above 0, at most 1; 1 with an age.
     pub release: f64,
-    /// The number of frames in a row, 1 or more; 1 with an age.
-    pub frames: u32,
+    /// For how long it is below that until the load has ended, ms; 0 with an age.
+    pub quiet_ms: f64,
+    /// The part of the level at which `t` is dated, from `release` to 1; `None`: onset and end are dated at level and
+    /// release.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub date: Option<f64>,
+    /// By how much labels are earlier than that at the median, ms, which is taken off `t`.
+    pub constant_ms: f64,
     /// The levels of a count, or of the area where a touch began, above 0 and ascending; none of other quantities.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<f64>,
-    /// The value at which `t` is dated, from `release` times the threshold to the threshold; `None`: onset and end are
-    /// dated at these.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dated_at: Option<f64>,
-    /// Whether `release` is a part of the largest value since the load began, above a rest that follows.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub of_largest: bool,
     /// The age of a touch at which the rule decides between two kinds, ms; `None`: it detects onsets and ends.
     pub age_ms: Option<Age>,
     /// The labels of onset and end, or of the kinds below and above the threshold; `None` omits those detections.
@@ -88,6 +81,9 @@ pub struct PlainRule {
     /// The taxels' rest. It is valid for one board on one day: a saved rule has none and receives one when it is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
+    /// How the rest of frames follows; `None`: it stays as it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<Following>,
     /// What the data of the training were like; `None` if it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training: Option<TrainingData>,
@@ -103,30 +99,35 @@ impl PlainRule {
     ///
     /// `Problem`, naming the part.
     pub fn check(&self) -> Result<()> {
-        above_0("threshold", self.threshold, "")?;
+        above_0("level", self.level, "")?;
         if !(self.release > 0.0 && self.release <= 1.0) {
             return Err(problem!("release"; " is {}: must be above 0 and at most 1", self.release));
         }
-        if !(1..=MOST_FRAMES).contains(&self.frames) {
-            return Err(problem!("frames"; " is {}: must be from 1 to {MOST_FRAMES}", self.frames));
+        if !(0.0..=LONGEST_MS).contains(&self.quiet_ms) {
+            return Err(problem!("quiet_ms"; " is {}: must be from 0 to {LONGEST_MS}", self.quiet_ms));
+        }
+        if !(-LONGEST_MS..=LONGEST_MS).contains(&self.constant_ms) {
+            return Err(problem!("constant_ms"; " is {}: must be within {LONGEST_MS} of 0", self.constant_ms));
+        }
+        if let Some(date) = self.date
+            && !(self.release..=1.0).contains(&date)
+        {
+            return Err(problem!("date"; " is {date}: must be from {}, the release, to 1", self.release));
         }
         self.check_levels()?;
-        self.check_dated()?;
         if (self.quantity == Quantity::Duration) != matches!(self.age_ms, Some(Age::Named(NamedAge::End))) {
             return Err(problem!("age_ms"; " end and the quantity duration: must be given together"));
         }
         if let Some(age) = self.age_ms {
             if let Age::Ms(age) = age
-                && !(0.0..=LATEST_AGE_MS).contains(&age)
+                && !(0.0..=LONGEST_MS).contains(&age)
             {
-                return Err(problem!("age_ms"; " is {age}: must be from 0 to {LATEST_AGE_MS}"));
+                return Err(problem!("age_ms"; " is {age}: must be from 0 to {LONGEST_MS}"));
             }
-            if self.release < 1.0 || self.frames > 1 {
+            if self.release < 1.0 || self.quiet_ms > 0.0 || self.date.is_some() {
                 return Err(problem!(
-                    "release is {} and frames is {}: with age_ms both must be 1, because a touch then begins with the first \
-                     frame in which 2 taxels are loaded",
-                    self.release,
-                    self.frames
+                    "age_ms"; " is given with a release below 1, a quiet time or a date: must be without them, because a \
+                     touch then begins with the first frame in which 2 taxels are loaded"
                 ));
             }
         }
@@ -145,6 +146,7 @@ impl PlainRule {
             _ => {}
         }
         self.training.as_ref().map_or(Ok(()), TrainingData::check)?;
+        self.rest.as_ref().map_or(Ok(()), Following::check)?;
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 
@@ -161,22 +163,6 @@ impl PlainRule {
         Ok(())
     }
 
-    fn check_dated(&self) -> Result<()> {
-        let (end, threshold) = (self.release * self.threshold, self.threshold);
-        match self.dated_at {
-            Some(_) if self.age_ms.is_some() || self.of_largest => {
-                Err(problem!("dated_at"; ": must be left out with age_ms, and with of_largest"))
-            }
-            Some(at) if !(end..=threshold).contains(&at) => {
-                Err(problem!("dated_at"; " is {at}: must be from {end}, where the load ends, to {threshold}"))
-            }
-            None if self.age_ms.is_some() && self.of_largest => {
-                Err(problem!("of_largest"; ": must be left out with age_ms"))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// Starts a stream for an array with frames of this duration.
     ///
     /// # Errors
@@ -184,17 +170,20 @@ impl PlainRule {
     /// `Problem` if a part is not valid, if there is no tare or one of another array, or if the period is not valid.
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         let way = self.way(array, tare)?;
-        Ok(ReadoutStream::new(vec![way], array.clone(), FrameClock::new(frames)?))
+        let tare = tare.or(self.tare.as_ref());
+        let rest = self.rest.zip(tare).map(|(following, tare)| tare.followed(array, following)).transpose()?;
+        Ok(ReadoutStream::new(vec![way], array.clone(), FrameClock::new(frames)?, rest))
     }
 
     /// The way of its stream, for an array.
     pub(super) fn way(&self, array: &Array, tare: Option<&Tare>) -> Result<Way> {
         self.check()?;
         let loads = Quantity::stream(&self.read(), &self.levels, array, tare.or(self.tare.as_ref()), self.noise_floor)?;
-        Ok(Way::of_rule(loads, RunningRule::new(self.limits()), self.labels.clone()))
+        let constant = us(self.constant_ms).round() as i64;
+        Ok(Way::of_rule(loads, RunningRule::new(self.limits()), self.labels.clone(), constant))
     }
 
-    /// The quantities that it reads: the one that is compared with the threshold, and with an age the area.
+    /// The quantities that it reads: the one that is compared with the level, and with an age the area.
     fn read(&self) -> Vec<Quantity> {
         if self.quantity == Quantity::Duration {
             return vec![Quantity::Area];
@@ -206,34 +195,24 @@ impl PlainRule {
         read
     }
 
-    /// The numbers by which it finds begins and ends of loads.
-    fn edges(&self) -> EdgeNumbers {
-        let Self { threshold, release, frames, dated_at, of_largest, .. } = *self;
-        EdgeNumbers { threshold, release, frames, dated_at, of_largest }
-    }
-
     /// How it decides; the parts must have been checked.
     fn limits(&self) -> Limits {
+        let Self { level, release, quiet_ms, date, .. } = *self;
         match self.age_ms {
-            Some(Age::Ms(age)) => Limits::at_age(self.read().len() as u32 - 1, self.threshold, age),
-            Some(Age::Named(NamedAge::End)) => Limits::at_end(self.threshold),
-            None => Limits::at_edges(&self.edges()),
+            Some(Age::Ms(age)) => Limits::at_age(self.read().len() as u32 - 1, level, age),
+            Some(Age::Named(NamedAge::End)) => Limits::at_end(level),
+            None => Limits::at_edges(&EdgeNumbers { level, release, quiet_ms, date }),
         }
     }
 
     /// The noise floor above the tare, in the sensor's unit; 0 of quantities that follow or need no rest.
     pub(super) fn floor_above_tare(&self) -> f64 {
-        if self.quantity.is_local() || self.quantity == Quantity::RangeCount { 0.0 } else { self.noise_floor }
+        if self.quantity.needs_no_floor() { 0.0 } else { self.noise_floor }
     }
 
     /// The time after the last input within which its last detection is complete, us.
     pub(super) fn reach_us(&self, period_us: f64) -> i64 {
-        (f64::from(self.frames) * period_us
-            + match self.age_ms {
-                Some(Age::Ms(age)) => us(age),
-                _ => 0.0,
-            })
-        .ceil() as i64
+        period_us.ceil() as i64 + self.limits().reach()
     }
 
     /// Reads a rule from the text of its file and checks it.

@@ -11,6 +11,7 @@ use crate::detect::stream::{DelayedNeurons, NamedNeuron, ReceivedTrains, Way};
 use crate::detect::{self, FrameClock, FrameTime, PlainRule, ReadoutStream, TrainedNeuron, TrainingData};
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
+use crate::rest::Following;
 use crate::spikes::us;
 use crate::{Array, Hint, Result, SpikeKind, problem};
 
@@ -56,6 +57,9 @@ pub struct Readout {
     /// The labels that are detected by their rule, and not by their neuron; without a rule such a label is never detected.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub by_rule: BTreeSet<String>,
+    /// How the rest of frames follows; `None`: it stays as it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<Following>,
     /// The ranges of inputs in training that older files hold; not read.
     #[serde(default, skip_serializing)]
     pub seen: IgnoredAny,
@@ -87,6 +91,7 @@ impl Readout {
         above_0("run_threshold", self.run_threshold, "")?;
         self.check_delays()?;
         self.training.as_ref().map_or(Ok(()), TrainingData::check)?;
+        self.rest.as_ref().map_or(Ok(()), Following::check)?;
         if self.neurons.is_empty() {
             return Err(problem!("readout: has no neuron; must have one or more"));
         }
@@ -230,7 +235,8 @@ impl Readout {
         for rule in self.running_rules() {
             ways.push(rule.way(array, tare)?);
         }
-        Ok(ReadoutStream::new(ways, array.clone(), FrameClock::new(frames)?))
+        let rest = self.rest.zip(tare).map(|(following, tare)| tare.followed(array, following)).transpose()?;
+        Ok(ReadoutStream::new(ways, array.clone(), FrameClock::new(frames)?, rest))
     }
 
     /// The rules that run, each with the one label that it detects here: one of two kinds may be detected by its neuron.

@@ -6,28 +6,37 @@ use crate::Spike;
 use crate::detect::FrameClock;
 use crate::spikes::{ms, us};
 
+/// The numbers of a rule that reports the begin and the end of each load, as of [`PlainRule`](crate::detect::PlainRule).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeNumbers {
+    /// The level at which a load begins.
+    pub level: f64,
+    /// The part of the level below which it ends.
+    pub release: f64,
+    /// For how long it is below that until it has ended, ms.
+    pub quiet_ms: f64,
+    /// The part of the level at which begins and ends are dated.
+    pub date: Option<f64>,
+}
+
 /// How a rule decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Limits {
-    /// A load begins in frames in which its quantity is at least this, above the rest if that follows.
-    pub begin: f64,
-    /// It ends in frames in which the quantity is below this; if the rest follows, below this part of the largest value
-    /// since the begin, both above the rest.
-    pub end: f64,
+    /// A load begins in frames in which its quantity is at least this.
+    begin: f64,
+    /// It ends in frames in which the quantity is below this.
+    end: f64,
     /// The time of a begin is when the quantity last came to the first of these, as it comes to `begin`; that of an end
     /// when it last came to the second one, likewise.
-    pub dated: [f64; 2],
-    /// Whether the rest of the quantity, which is 0 at first, follows it: down while the sensor is not loaded, and to where
-    /// it is as a load ends.
-    pub follows: bool,
-    /// The number of such frames in a row.
-    pub frames: i64,
+    dated: [f64; 2],
+    /// For how long it must be below `end`, us.
+    quiet: i64,
     /// The train with the quantity of which a load is made.
-    pub touch_train: u32,
-    /// Train 0 is compared with this threshold, where the rule decides at an age.
-    pub threshold: f64,
+    touch_train: u32,
+    /// Train 0 is compared with this, where the rule decides at an age.
+    level: f64,
     /// When the rule decides.
-    pub when: When,
+    when: When,
 }
 
 /// When a rule decides.
@@ -44,88 +53,67 @@ pub(super) enum When {
 impl Limits {
     /// The area from which on a sensor is touched, where a rule decides at an age: the smallest that there is, of channels,
     /// which count alone. A loaded taxel of a grid counts only beside another one.
-    const TOUCHED: f64 = 1.0;
-
-    /// Decides at an age of each touch, which the area on `touch_train` begins in one frame.
-    pub(super) fn at_age(touch_train: u32, threshold: f64, age_ms: f64) -> Self {
-        let when = When::AtAge(us(age_ms).round() as i64);
-        let edge = Self::TOUCHED;
-        let (dated, follows) = ([edge; 2], false);
-        Self { begin: edge, end: edge, dated, follows, frames: 1, touch_train, threshold, when }
-    }
+    const TOUCHED: EdgeNumbers = EdgeNumbers { level: 1.0, release: 1.0, quiet_ms: 0.0, date: None };
 
     /// Reports the begin and the end of each load.
     pub(super) fn at_edges(edges: &EdgeNumbers) -> Self {
-        let EdgeNumbers { threshold, release, frames, dated_at, of_largest } = *edges;
-        let end = if of_largest { release } else { release * threshold };
+        let EdgeNumbers { level, release, quiet_ms, date } = *edges;
+        let end = release * level;
         Self {
-            begin: threshold,
+            begin: level,
             end,
-            dated: dated_at.map_or([threshold, end], |at| [at; 2]),
-            follows: of_largest,
-            frames: i64::from(frames),
+            dated: date.map_or([level, end], |date| [date * level; 2]),
+            quiet: us(quiet_ms).round() as i64,
             touch_train: 0,
-            threshold,
+            level,
             when: When::Edges,
         }
     }
 
-    /// Decides when each touch ends, which the area on train 0 begins, by its duration, ms.
-    pub(super) fn at_end(threshold: f64) -> Self {
-        Self { when: When::AtEnd, ..Self::at_age(0, threshold, 0.0) }
+    /// Decides at an age of each touch, which the area on `touch_train` begins in one frame.
+    pub(super) fn at_age(touch_train: u32, level: f64, age_ms: f64) -> Self {
+        let when = When::AtAge(us(age_ms).round() as i64);
+        Self { touch_train, level, when, ..Self::at_edges(&Self::TOUCHED) }
     }
 
-    /// Which limits a quantity of this value has passed, of a rest that does not follow.
+    /// Decides when each touch ends, which the area on train 0 begins, by its duration, ms.
+    pub(super) fn at_end(level: f64) -> Self {
+        Self { level, when: When::AtEnd, ..Self::at_edges(&Self::TOUCHED) }
+    }
+
+    /// The longest time after an input within which a decision on it is due, us.
+    pub(super) fn reach(&self) -> i64 {
+        self.quiet + if let When::AtAge(age) = self.when { age } else { 0 }
+    }
+
+    /// Which limits a quantity of this value has passed.
     pub(super) fn passed_limits(&self, load: f64) -> [bool; 4] {
         let [dated_begin, dated_end] = self.dated;
         [load >= self.begin, load < self.end, load >= dated_begin, load < dated_end]
     }
 }
 
-/// The numbers of a rule that reports the begin and the end of each load, as of [`PlainRule`](crate::detect::PlainRule).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeNumbers {
-    /// The threshold at which a load begins.
-    pub threshold: f64,
-    /// The part below which it ends, of the threshold or of the largest value.
-    pub release: f64,
-    /// The number of frames in a row.
-    pub frames: u32,
-    /// The value at which begins and ends are dated.
-    pub dated_at: Option<f64>,
-    /// Whether a load ends below a part of its largest value, and the rest follows.
-    pub of_largest: bool,
-}
-
 /// What a rule found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
-    /// Which of the rule's two labels: 0 for the begin, or below the threshold; 1 for the end, or above.
+    /// Which of the rule's two labels: 0 for the begin, or below the level; 1 for the end, or above.
     pub label: usize,
     /// The begin or end of the load, us.
     pub t: i64,
     /// The end of the last frame on which the decision rests, us.
     pub known: i64,
-    /// Whether a quantity changed in these frames together with a repair.
+    /// Whether a quantity changed together with a repair in the frames on which it rests.
     pub repaired: bool,
     /// The quantity of train 0 when the rule decided; the duration, ms, where it decided at the end.
     pub value: f64,
 }
 
-/// Frames in a row, all so far, in which the load begins or ends.
+/// What is decided once the frame that holds at a time is complete.
 #[derive(Debug, Clone, Copy)]
-struct LoadRun {
-    /// The number of the first of these frames.
-    first: i64,
-    /// The time at which the quantity passed the limit in it, us.
+struct Waiting {
+    /// When the load began, or ended, us.
     t: i64,
-    repaired: bool,
-}
-
-/// A load that waits for the age at which it is decided.
-#[derive(Debug, Clone, Copy)]
-struct WaitingLoad {
-    t: i64,
+    /// The time at which it is decided, us.
     at: i64,
     repaired: bool,
 }
@@ -134,41 +122,31 @@ struct WaitingLoad {
 #[derive(Clone)]
 pub(super) struct RunningRule {
     limits: Limits,
-    /// Whether the sensor is loaded.
-    loaded: bool,
+    /// Whether the sensor is loaded; `None` before the first value, which shows it.
+    loaded: Option<bool>,
     /// The quantity of which a load is made, after its last change.
     load: f64,
-    /// The number of the frame of that change.
-    changed: i64,
-    /// The time at which the quantity last passed the limit by which the next change of the state is dated, us.
+    /// When the quantity last passed the limit by which the next change of the state is dated, us.
     passed: i64,
-    /// The rest that the quantity has, if it follows; else 0.
-    rest: f64,
-    /// The largest value of the quantity since the load began.
-    largest: f64,
-    /// Whether a quantity changed together with a repair in a frame that is not complete.
-    repaired: bool,
-    run: Option<LoadRun>,
-    /// The quantity that is compared with the threshold.
+    /// The change of the state that has come, as long as the quantity stays there.
+    changing: Option<Waiting>,
+    /// The quantity that is compared with the level.
     quantity: f64,
-    waiting: VecDeque<WaitingLoad>,
+    /// Loads that wait for the age at which they are decided.
+    waiting: VecDeque<Waiting>,
     /// When the load began that lasts, us, and whether that may rest on a repair.
     begun: (i64, bool),
 }
 
 impl RunningRule {
-    /// A rule before any input: not loaded, all quantities 0.
+    /// A rule before any input.
     pub(super) fn new(limits: Limits) -> Self {
         Self {
             limits,
-            loaded: false,
+            loaded: None,
             load: 0.0,
-            changed: i64::MIN,
             passed: 0,
-            rest: 0.0,
-            largest: 0.0,
-            repaired: false,
-            run: None,
+            changing: None,
             quantity: 0.0,
             waiting: VecDeque::new(),
             begun: (0, false),
@@ -179,89 +157,73 @@ impl RunningRule {
     pub(super) fn change(&mut self, change: Spike, repaired: bool, clock: &FrameClock, out: &mut Vec<Decision>) {
         let t = us(change.t).round() as i64;
         self.advance(t, clock, out);
+        let value = f64::from(change.value);
+        if change.train == 0 {
+            self.quantity = value;
+        }
         if change.train == self.limits.touch_train {
             let before = self.passes(self.limits.dated);
-            (self.load, self.changed) = (f64::from(change.value), clock.number_of(t));
-            self.largest = self.largest.max(self.load);
-            if self.limits.follows && !self.loaded {
-                self.rest = self.rest.min(self.load);
-            }
+            self.load = value;
+            let loaded = *self.loaded.get_or_insert(value >= self.limits.begin);
             if self.passes(self.limits.dated) && !before {
                 self.passed = t;
             }
-        }
-        if change.train == 0 {
-            self.quantity = f64::from(change.value);
+            if !self.passes([self.limits.begin, self.limits.end]) {
+                self.changing = None;
+            } else if self.changing.is_none() {
+                let at = t + if loaded { self.limits.quiet } else { 0 };
+                self.changing = Some(Waiting { t: self.passed, at, repaired: false });
+            }
         }
         if repaired {
-            self.repaired = true;
-            self.waiting.iter_mut().for_each(|due| due.repaired = true);
+            self.changing.iter_mut().chain(&mut self.waiting).for_each(|due| due.repaired = true);
         }
     }
 
     /// Decides on all frames that are complete, because no change before `t` us follows.
     pub(super) fn advance(&mut self, t: i64, clock: &FrameClock, out: &mut Vec<Decision>) {
-        self.close_before(clock.open_at(t), clock, out);
-        while let Some(due) = self.waiting.front().filter(|due| clock.is_over(due.at, t)) {
-            out.push(Decision {
-                label: usize::from(self.quantity >= self.limits.threshold),
-                t: due.t,
-                known: clock.end_of(ms(due.at)),
-                repaired: due.repaired,
-                value: self.quantity,
-            });
+        if let Some(due) = self.changing.take_if(|due| clock.is_over(due.at, t)) {
+            self.change_state(due, clock, out);
+        }
+        while let Some(due) = self.waiting.front().copied().filter(|due| clock.is_over(due.at, t)) {
             self.waiting.pop_front();
+            let label = usize::from(self.quantity >= self.limits.level);
+            out.push(self.decision(label, due, clock));
         }
     }
 
-    /// Counts the frames before number `open`, which are complete.
-    fn close_before(&mut self, open: i64, clock: &FrameClock, out: &mut Vec<Decision>) {
-        if self.changed >= open {
-            return;
-        }
-        let repaired = std::mem::take(&mut self.repaired);
-        if !self.passes([self.limits.begin, self.limits.end]) {
-            self.run = None;
-            return;
-        }
-        // Frames before that of the last change were counted when it came.
-        let run = self.run.get_or_insert(LoadRun { first: self.changed, t: self.passed, repaired: false });
-        run.repaired |= repaired;
-        let LoadRun { first, t, repaired } = *run;
-        if open - first < self.limits.frames {
-            return;
-        }
-        self.run = None;
-        self.loaded = !self.loaded;
-        self.largest = self.load;
-        if self.limits.follows && !self.loaded {
-            self.rest = self.load;
-        }
-        let known = clock.end_of_number(first + self.limits.frames - 1);
-        let (begun, repaired_begin) = self.begun;
-        if self.loaded {
-            self.begun = (t, repaired);
+    /// Begins or ends a load.
+    fn change_state(&mut self, due: Waiting, clock: &FrameClock, out: &mut Vec<Decision>) {
+        let ends = self.loaded == Some(true);
+        self.loaded = Some(!ends);
+        let (begun, repaired) = self.begun;
+        if !ends {
+            self.begun = (due.t, due.repaired);
         }
         match self.limits.when {
-            When::Edges => {
-                out.push(Decision { label: usize::from(!self.loaded), t, known, repaired, value: self.quantity })
-            }
-            When::AtAge(age) if self.loaded => self.waiting.push_back(WaitingLoad { t, at: t + age, repaired }),
-            When::AtEnd if !self.loaded => {
-                let value = ms(t - begun);
-                let label = usize::from(value >= self.limits.threshold);
-                out.push(Decision { label, t: begun, known, repaired: repaired || repaired_begin, value });
+            When::Edges => out.push(self.decision(usize::from(ends), due, clock)),
+            When::AtAge(age) if !ends => self.waiting.push_back(Waiting { at: due.t + age, ..due }),
+            When::AtEnd if ends => {
+                let value = ms(due.t - begun);
+                let label = usize::from(value >= self.limits.level);
+                let due = Waiting { t: begun, repaired: due.repaired || repaired, ..due };
+                out.push(Decision { value, ..self.decision(label, due, clock) });
             }
             When::AtAge(_) | When::AtEnd => {}
         }
     }
 
+    fn decision(&self, label: usize, due: Waiting, clock: &FrameClock) -> Decision {
+        let Waiting { t, at, repaired } = due;
+        Decision { label, t, known: clock.end_of(ms(at)), repaired, value: self.quantity }
+    }
+
     /// Whether the quantity has come to the begin of the next load, or to the end of the present one.
     fn passes(&self, [begin, end]: [f64; 2]) -> bool {
-        match (self.loaded, self.limits.follows) {
-            (false, _) => self.load >= self.rest + begin,
-            (true, false) => self.load < end,
-            (true, true) => self.load < self.rest + end * (self.largest - self.rest),
+        match self.loaded {
+            Some(true) => self.load < end,
+            Some(false) => self.load >= begin,
+            None => false,
         }
     }
 }

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use crate::detect::running_rule::{Decision, RunningRule};
 use crate::detect::{Detection, FrameClock};
 use crate::encode::{Stream, Zeroing};
+use crate::rest::{FollowedRest, LeftFloor};
 use crate::spikes::ms;
 use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 
@@ -35,6 +36,8 @@ pub struct ReadoutStream {
     ways: Vec<Way>,
     array: Array,
     clock: FrameClock,
+    /// The rest of frames that follows, or is watched; events have none, whose values hold and are no samples.
+    rest: Option<FollowedRest>,
     /// The time before which no input can follow, us.
     now: Option<i64>,
     /// Taxels to be zeroed, in order of time, each after all events up to its time.
@@ -62,8 +65,8 @@ pub(super) struct Way {
 #[derive(Clone)]
 enum Decides {
     Neurons(DelayedNeurons),
-    /// A plain rule, for which they are changes of its quantities, with its labels.
-    Rule(Box<RunningRule>, [Option<String>; 2]),
+    /// A plain rule, for which they are changes of its quantities, with its labels, and its constant, us.
+    Rule(Box<RunningRule>, [Option<String>; 2], i64),
 }
 
 impl Way {
@@ -73,8 +76,13 @@ impl Way {
     }
 
     /// That of a plain rule: `loads` emits the changes of its quantities.
-    pub(super) fn of_rule(loads: Box<dyn Stream>, rule: RunningRule, labels: [Option<String>; 2]) -> Self {
-        Self::new(loads, Decides::Rule(Box::new(rule), labels))
+    pub(super) fn of_rule(
+        loads: Box<dyn Stream>,
+        rule: RunningRule,
+        labels: [Option<String>; 2],
+        constant: i64,
+    ) -> Self {
+        Self::new(loads, Decides::Rule(Box::new(rule), labels, constant))
     }
 
     fn new(encoder: Box<dyn Stream>, decides: Decides) -> Self {
@@ -98,11 +106,12 @@ impl Way {
                 neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
                 neurons.settle(ms(until), clock, begin, out)?;
             }
-            Decides::Rule(rule, labels) => {
+            Decides::Rule(rule, labels, constant) => {
                 let mut decisions = vec![];
                 spikes.for_each(|(change, repaired)| rule.change(change, repaired, clock, &mut decisions));
                 rule.advance(until, clock, &mut decisions);
                 out.extend(decisions.into_iter().filter_map(|Decision { label, t, known, repaired, .. }| {
+                    let t = t - *constant;
                     let label = labels[label].clone().filter(|_| t >= begin)?;
                     // A rule has no potential, hence no slope.
                     Some(Detection { label, t, known, slope: f64::NAN, repaired })
@@ -116,11 +125,12 @@ impl Way {
 }
 
 impl ReadoutStream {
-    pub(super) fn new(ways: Vec<Way>, array: Array, clock: FrameClock) -> Self {
+    pub(super) fn new(ways: Vec<Way>, array: Array, clock: FrameClock, rest: Option<FollowedRest>) -> Self {
         Self {
             ways,
             array,
             clock,
+            rest,
             now: None,
             zeroings: VecDeque::new(),
             late: 0,
@@ -189,13 +199,11 @@ impl ReadoutStream {
     pub fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
         self.zero_before(t);
-        match &self.smaller {
-            Some(smaller) if values.len() == smaller.len() => {
-                let padded = self.array.padded(values, smaller.columns, &0.0);
-                self.ways.iter_mut().try_for_each(|way| way.encoder.push_frame(t, &padded, &mut way.emitted))?;
-            }
-            _ => self.ways.iter_mut().try_for_each(|way| way.encoder.push_frame(t, values, &mut way.emitted))?,
-        }
+        let smaller = self.smaller.as_ref().filter(|smaller| values.len() == smaller.len());
+        let padded = smaller.map(|smaller| self.array.padded(values, smaller.columns, &0.0));
+        let values = padded.as_deref().unwrap_or(values);
+        let values = self.rest.as_mut().map_or(values, |rest| rest.take(t, values));
+        self.ways.iter_mut().try_for_each(|way| way.encoder.push_frame(t, values, &mut way.emitted))?;
         self.settle(t, out)?;
         self.clock.start_frame(t);
         Ok(())
@@ -243,8 +251,16 @@ impl ReadoutStream {
     pub fn rest(&self) -> Vec<Option<f64>> {
         let (rows, columns) = (self.input_array().rows, self.input_array().columns);
         let taxels = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
-        let rest_of = |taxel| self.ways.iter().find_map(|way| way.encoder.rest(taxel));
+        let moved = |taxel| self.rest.as_ref().map_or(0.0, |rest| rest.moved(taxel));
+        let measured = |taxel| self.ways.iter().find_map(|way| way.encoder.rest(taxel));
+        let rest_of = |taxel| measured(taxel).map(|rest| rest + moved(taxel));
         taxels.map(|(x, y)| rest_of(self.array.index(x, y))).collect()
+    }
+
+    /// Since when what is at rest is outside the noise floor of the training, if it was so far; known of frames.
+    #[must_use]
+    pub fn left_floor(&self) -> Option<LeftFloor> {
+        self.rest.as_ref().and_then(FollowedRest::left)
     }
 
     /// The number of events that arrived after later events, or after time was advanced beyond them.
@@ -328,6 +344,7 @@ impl ReadoutStream {
         for zeroing in self.zeroings.drain(..over) {
             let at = self.now.map_or(zeroing.t, |now| now.max(zeroing.t));
             let taxel = self.array.index(zeroing.x, zeroing.y);
+            self.rest.iter_mut().for_each(|rest| rest.set(taxel, zeroing.rest));
             for way in &mut self.ways {
                 way.encoder.set_rest(at, taxel, zeroing.rest, &mut way.emitted);
             }

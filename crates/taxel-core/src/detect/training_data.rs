@@ -1,4 +1,4 @@
-//! What the data of a training were like, beside which a recording is drawn and compared.
+//! What the data of a training were like, with which a recording is compared.
 
 use std::collections::BTreeMap;
 
@@ -17,8 +17,6 @@ pub struct TrainingData {
     /// By how much labels are later than what was felt, ms, of each label of which that was taken off.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants_ms: BTreeMap<String, f64>,
-    /// What was measured of loads, by feature.
-    pub loads: BTreeMap<String, Quantiles>,
     /// The board that sent the data, where its registers are known and were the same in all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<TrainedBoard>,
@@ -42,16 +40,6 @@ pub struct TrainedBoard {
     pub preset: Option<String>,
 }
 
-/// The distribution of a feature of loads.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Quantiles {
-    /// How many values there were.
-    pub count: usize,
-    /// Their quantiles at equal steps from 0 to 1, which ascend.
-    pub values: Vec<f64>,
-}
-
 impl TrainingData {
     /// Checks that the numbers are in their ranges.
     ///
@@ -73,14 +61,6 @@ impl TrainingData {
                 return Err(problem!("training: {name} is {us}: must be above 0, and finite"));
             }
         }
-        for (feature, Quantiles { count, values }) in &self.loads {
-            let finite = values.iter().all(|value| value.is_finite());
-            if *count == 0 || values.len() < 2 || !finite || !values.is_sorted() {
-                return Err(problem!(
-                    "training: {feature} must have a count, and two finite values or more that ascend"
-                ));
-            }
-        }
         Ok(())
     }
 }
@@ -94,12 +74,10 @@ mod tests {
     }
 
     fn data() -> TrainingData {
-        let peak = Quantiles { count: 9, values: vec![1.0, 2.0, 2.0] };
         TrainingData {
             noise_floor: 0.5,
             error_ms: BTreeMap::from([("contact".to_owned(), -3.0)]),
             constants_ms: BTreeMap::from([("contact".to_owned(), 80.0)]),
-            loads: BTreeMap::from([("peak".to_owned(), peak)]),
             board: Some(board(192.0)),
             period_us: Some(1e4),
             sides: vec!["left".to_owned()],
@@ -111,15 +89,10 @@ mod tests {
         let text = serde_json::to_string(&data()).unwrap();
         assert_eq!(serde_json::from_str::<TrainingData>(&text).unwrap(), data());
         assert!(data().check().is_ok());
-        let of = |count, values| BTreeMap::from([("peak".to_owned(), Quantiles { count, values })]);
         for wrong in [
             TrainingData { noise_floor: -1.0, ..data() },
             TrainingData { error_ms: BTreeMap::from([("lift".to_owned(), f64::INFINITY)]), ..data() },
             TrainingData { constants_ms: BTreeMap::from([("lift".to_owned(), f64::NAN)]), ..data() },
-            TrainingData { loads: of(0, vec![1.0, 2.0]), ..data() },
-            TrainingData { loads: of(3, vec![1.0]), ..data() },
-            TrainingData { loads: of(3, vec![2.0, 1.0]), ..data() },
-            TrainingData { loads: of(3, vec![1.0, f64::NAN]), ..data() },
             TrainingData { board: Some(board(0.0)), ..data() },
             TrainingData { period_us: Some(f64::NAN), ..data() },
         ] {

@@ -5,9 +5,12 @@ use super::channels::Channels;
 use super::driver::{Clock, Driver, Rule, Sample, Trains};
 use super::level_count::LevelCount;
 use super::levels::Levels;
+use super::load_sum::LoadSum;
 use super::loaded::Loaded;
 use super::local_sums::{LocalSums, SumPair};
+use super::moved::Moved;
 use super::peak_load::PeakLoad;
+use super::range_load::RangeLoad;
 use super::stream::Stream;
 use crate::rest::Rest;
 use crate::spikes::ms;
@@ -18,10 +21,14 @@ use crate::{Array, Spike};
 pub(super) enum Feature {
     /// The number of loaded taxels.
     Area(Loaded),
-    /// The sum of their values above rest.
-    Total(Loaded),
+    /// The sum of all values above rest, and that without the largest.
+    Load(LoadSum),
+    /// What moved within the load, the rise and the fall of the sum.
+    Moved(Moved),
     /// The largest local sums: above the rest, then above and below each running mean.
     Local(LocalSums),
+    /// The load by running range.
+    Range(RangeLoad),
     /// The largest deviation of a taxel in units of its own noise.
     Peak(PeakLoad),
     /// The number of levels that the taxels are above.
@@ -33,7 +40,7 @@ pub(super) enum Feature {
 impl Feature {
     /// Whether it changes while the values hold.
     fn drifts(&self) -> bool {
-        matches!(self, Self::Local(_) | Self::Peak(_))
+        matches!(self, Self::Local(_) | Self::Moved(_))
     }
 
     /// Appends its values.
@@ -43,10 +50,8 @@ impl Feature {
                 loaded.take_frame(now);
                 values.push(f64::from(loaded.area()));
             }
-            Self::Total(loaded) => {
-                loaded.take_frame(now);
-                values.push(loaded.sums(now.held).total);
-            }
+            Self::Load(load) => values.extend(load.take(now)),
+            Self::Moved(moved) => values.extend(moved.take(now)),
             Self::Local(sums) => {
                 let mut of_rest = true;
                 sums.take(now.t, now.held.as_flattened(), |SumPair { largest, .. }| {
@@ -54,7 +59,8 @@ impl Feature {
                     values.extend_from_slice(present);
                 });
             }
-            Self::Peak(peak) => values.push(peak.take(now.t, now.held.as_flattened())),
+            Self::Range(range) => values.push(range.take(now)),
+            Self::Peak(peak) => values.push(peak.take(now.held.as_flattened())),
             Self::Count(count) => values.push(count.take(now) as f64),
             Self::Begin(begin) => values.push(begin.take(now) as f64),
         }
@@ -62,8 +68,11 @@ impl Feature {
 
     fn set_rest(&mut self, taxel: usize, rest: f64) {
         match self {
-            Self::Area(loaded) | Self::Total(loaded) => loaded.set_rest(taxel, rest),
+            Self::Area(loaded) => loaded.set_rest(taxel, rest),
+            Self::Load(load) => load.set_rest(taxel, rest),
+            Self::Moved(moved) => moved.set_rest(taxel, rest),
             Self::Local(sums) => sums.set_rest(taxel, rest),
+            Self::Range(_) => {}
             Self::Peak(peak) => peak.set_rest(taxel, rest),
             Self::Count(count) => count.set_rest(taxel, rest),
             Self::Begin(begin) => begin.loaded().set_rest(taxel, rest),
@@ -76,7 +85,8 @@ impl Feature {
 pub(super) enum Emit {
     /// Those of levels, equally many of each value.
     Crossings(Levels),
-    /// One for every change of some values, by their number, with the new value; all are 0 at first.
+    /// One for every change of some values, by their number, with the new value. The first frame shows the first ones, where
+    /// they are known (else NaN); of events all are 0 at first.
     Changes { which: Vec<usize>, last: Vec<f32> },
 }
 
@@ -104,6 +114,16 @@ pub(super) fn stream(
 }
 
 impl Rule for FeatureRule {
+    /// The first frame shows which levels the values are above; before the first event they are at rest.
+    fn begin(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        if now.of_frame && matches!(self.emit, Emit::Crossings(_)) {
+            let mut crossed = vec![];
+            self.sample(now, &mut crossed);
+        } else {
+            self.sample(now, out);
+        }
+    }
+
     #[inline(always)]
     fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
         let Self { features, values, emit, .. } = self;
@@ -118,7 +138,11 @@ impl Rule for FeatureRule {
             Emit::Changes { which, last } => {
                 for (train, (&value, last)) in (0..).zip(which.iter().zip(last)) {
                     let value = values[value] as f32;
-                    if value != *last {
+                    if last.is_nan() && !now.of_frame {
+                        *last = 0.0;
+                        out.push(Spike { t: ms(now.t), train, value: 0.0 });
+                    }
+                    if value != *last && !value.is_nan() {
                         *last = value;
                         out.push(Spike { t: ms(now.t), train, value });
                     }
@@ -131,7 +155,7 @@ impl Rule for FeatureRule {
     fn read(&mut self, channel: usize, _from: f32, to: f32, _repaired: bool) {
         for feature in &mut self.features {
             match feature {
-                Feature::Area(loaded) | Feature::Total(loaded) => loaded.take(channel, to),
+                Feature::Area(loaded) => loaded.take(channel, to),
                 Feature::Begin(begin) => begin.loaded().take(channel, to),
                 _ => {}
             }

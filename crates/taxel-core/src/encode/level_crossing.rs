@@ -160,11 +160,6 @@ impl LevelCrossings {
         self.levels.levels.above()
     }
 
-    /// Whether levels are parts of running ranges.
-    pub(super) fn is_of_range(&self) -> bool {
-        self.window.is_some()
-    }
-
     /// Rescales the levels to the running ranges; a channel whose range is empty stays below all levels.
     fn scale(&mut self, ranges: &[(f64, f64)]) {
         for (channel, &(low, high)) in ranges.iter().enumerate().take(self.levels.channels()) {

@@ -18,12 +18,11 @@ parameters! {
     /// Peak: rises and falls of the largest deviation from the rest through levels, in units of each taxel's own noise.
     ///
     /// With u a value less its rest, divided by the taxel's standard deviation in the tare (at least `least_noise`), the
-    /// peak is the largest u, and where several are 4 or more, the root of the sum of their squares; at least 0. The rest
-    /// begins at the tare and follows each taxel's value, as that of [`LocalLoad`](super::LocalLoad). A taxel without a
-    /// rest in the tare is left out; one that is 0 from the first value on has no value yet and counts as at rest.
+    /// peak is the largest u, and where several are 4 or more, the root of the sum of their squares; at least 0. A taxel
+    /// without a rest in the tare is left out; one that is 0 from the first value on has no value yet and counts as at rest.
     ///
     /// Trains, unsigned: rises to each level, then falls below `release` times each. They are computed once a stamp,
-    /// after its last event, and as the rest moves.
+    /// after its last event.
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Peak {

@@ -1,7 +1,7 @@
-//! The largest deviation of a taxel from a tracked rest, in units of its own noise, with what several taxels add.
+//! The largest deviation of a taxel from its rest, in units of its own noise, with what several taxels add.
 
 use super::tare::Tare;
-use crate::rest::{Baseline, FAR_NOISE, Value, Waiting};
+use crate::rest::{Value, Waiting};
 use crate::vectors::{LANES, wide};
 use crate::{Array, Result};
 
@@ -24,44 +24,44 @@ wide! {
     }
 }
 
-/// Computes the peak of values above a tracked rest.
+/// Computes the peak of values above the rest.
 #[derive(Clone)]
 pub(super) struct PeakLoad {
-    baseline: Baseline,
+    /// The rest of each taxel; 0 of those left out.
+    rest: Vec<f32>,
     /// 1 over each taxel's noise; 0 of those left out.
     per_noise: Vec<f32>,
     least: f64,
-    values: Vec<f32>,
+    above: Vec<f32>,
     waiting: Waiting,
 }
 
 impl PeakLoad {
     /// Starts from a tare; a taxel's noise is at least `least`.
     pub(super) fn new(array: &Array, tare: &Tare, least: f64) -> Result<Self> {
-        let (rest, noise) = (tare.rest_of(array)?, tare.place_noise());
-        let mut per_noise = vec![0.0; array.len()];
-        let mut far = vec![f32::INFINITY; array.len()];
-        for taxel in (0..array.len()).filter(|&taxel| rest.values()[taxel] != f64::NO_REST && array.has(taxel)) {
-            let noise = noise[taxel].max(least);
-            per_noise[taxel] = noise.recip() as f32;
-            far[taxel] = (FAR_NOISE * noise) as f32;
+        let (rest, noise, zeros) = (tare.rest_of(array)?, tare.place_noise(), vec![0.0; array.len()]);
+        let (per_noise, above) = (zeros.clone(), zeros.clone());
+        let mut new = Self { rest: zeros, per_noise, least, above, waiting: Waiting::default() };
+        for (taxel, &rest) in rest.values().iter().enumerate().filter(|(_, rest)| **rest != f64::NO_REST) {
+            new.per_noise[taxel] = noise[taxel].max(least).recip() as f32;
+            new.set_rest(taxel, rest);
         }
-        let baseline = Baseline::tracked(rest.values().to_vec(), far);
-        Ok(Self { baseline, per_noise, least, values: vec![0.0; array.len()], waiting: Waiting::default() })
+        Ok(new)
     }
 
-    /// Reads the values of all taxels, row by row, at `t` us; returns the peak.
-    pub(super) fn take(&mut self, t: i64, held: &[f32]) -> f64 {
-        self.values.copy_from_slice(&held[..self.per_noise.len()]);
-        self.waiting.fill(&mut self.values, self.baseline.values());
-        let (above, per_noise) = (self.baseline.take(t, &self.values), &self.per_noise[..]);
+    /// Reads the values of all taxels, row by row; returns the peak.
+    pub(super) fn take(&mut self, held: &[f32]) -> f64 {
+        let Self { rest, per_noise, above, .. } = self;
+        above.copy_from_slice(&held[..rest.len()]);
+        self.waiting.fill(above, rest);
+        above.iter_mut().zip(&*rest).for_each(|(above, rest)| *above -= rest);
         // Those behind the last whole group stand in one of their own, beside zeros.
         let grouped = above.len() / LANES * LANES;
-        let mut rest = [[0.0; LANES]; 2];
-        for (group, values) in rest.iter_mut().zip([above, per_noise]) {
+        let mut others = [[0.0; LANES]; 2];
+        for (group, values) in others.iter_mut().zip([&above[..], per_noise]) {
             group[..values.len() - grouped].copy_from_slice(&values[grouped..]);
         }
-        let (first, last) = (extent(&above[..grouped], &per_noise[..grouped]), extent(&rest[0], &rest[1]));
+        let (first, last) = (extent(&above[..grouped], &per_noise[..grouped]), extent(&others[0], &others[1]));
         f64::from(first.0.max(last.0)).max((first.1 + last.1).sqrt())
     }
 
@@ -69,8 +69,7 @@ impl PeakLoad {
     pub(super) fn set_rest(&mut self, taxel: usize, rest: f64) {
         if self.per_noise[taxel] == 0.0 {
             self.per_noise[taxel] = self.least.recip() as f32;
-            self.baseline.set_far(taxel, (FAR_NOISE * self.least) as f32);
         }
-        self.baseline.set(taxel, rest);
+        self.rest[taxel] = rest as f32;
     }
 }

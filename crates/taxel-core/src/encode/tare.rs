@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::channels::not_finite;
 use crate::held::Held;
-use crate::rest::{Rest, Value};
+use crate::rest::{FollowedRest, Following, Rest, Value};
 use crate::{Array, EventsView, FramesView, Result, problem, reading};
 
 /// The rest of each taxel, the time average of its value over an interval without contact, and its noise there.
@@ -84,6 +84,16 @@ impl Tare {
         }
         let rest_of = |(taxel, rest): (usize, &Option<f64>)| rest.filter(|_| array.has(taxel)).unwrap_or(f64::NO_REST);
         Ok(Rest::measured(self.rest.iter().enumerate().map(rest_of).collect()))
+    }
+
+    /// The rest of an array's frames, which follows from the tare on.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if the tare is of an array of another shape, or a number of `following` is not in its range.
+    pub fn followed(&self, array: &Array, following: Following) -> Result<FollowedRest> {
+        following.check()?;
+        Ok(FollowedRest::new(following, array, self.rest_of(array)?.values(), &self.place_noise()))
     }
 
     /// The noise of each taxel; 0 where it is not known.

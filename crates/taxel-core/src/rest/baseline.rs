@@ -45,12 +45,13 @@ pub struct Waiting(Option<Vec<usize>>);
 
 impl Waiting {
     /// Replaces the next values of these taxels by their rest ([`Value::NO_REST`] if unknown).
-    pub fn fill(&mut self, values: &mut [f32], rest: &[f64]) {
+    pub fn fill(&mut self, values: &mut [f32], rest: &[impl Copy + Into<f64>]) {
         let is_0 = |&taxel: &usize| values[taxel] == 0.0;
         let waiting = self.0.get_or_insert_with(|| (0..values.len()).filter(is_0).collect());
         waiting.retain(is_0);
         for &taxel in &*waiting {
-            values[taxel] = if rest[taxel] == f64::NO_REST { 0.0 } else { rest[taxel] as f32 };
+            let rest = rest[taxel].into();
+            values[taxel] = if rest == f64::NO_REST { 0.0 } else { rest as f32 };
         }
     }
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use taxel_core::counts_since;
 use taxel_core::encode::Tare;
+use taxel_core::rest::LeftFloor;
 use taxel_core::wire::{self, SenderTotals, StepBack};
 
 use super::frame_input::LineCounts;
@@ -91,6 +92,8 @@ pub struct ReadoutCounts {
     pub detections_dropped: u64,
     /// Whether a tare is being measured.
     pub taring: bool,
+    /// Since when what is at rest is outside the noise floor of the training, if it was so far; known of frames.
+    pub left_floor: Option<LeftFloor>,
 }
 
 /// When the board was last received, at which time of its clock, and its start and stop markers.
@@ -223,6 +226,7 @@ impl ReadoutCounts {
             self, earlier;
             read_out, events_dropped, late, detections, wrong, detections_dropped;
             taring: self.taring,
+            left_floor: self.left_floor,
         }
     }
 }

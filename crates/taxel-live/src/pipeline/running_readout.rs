@@ -137,6 +137,7 @@ impl RunningReadout {
             counters.readout.read_out += (events.len() + frames.t.len()) as u64;
             if let Mode::Reading(readout) = &self.mode {
                 (counters.readout.late, counters.readout.wrong) = (readout.late(), readout.wrong());
+                counters.readout.left_floor = readout.left_floor();
             }
         }
         Ok(())

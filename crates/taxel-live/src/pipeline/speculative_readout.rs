@@ -2,6 +2,7 @@
 
 use taxel_core::detect::{Detection, ReadoutStream};
 use taxel_core::encode::Zeroing;
+use taxel_core::rest::LeftFloor;
 use taxel_core::{EventsView, Result};
 
 use super::readout_queue::QuietUntil;
@@ -110,6 +111,11 @@ impl SpeculativeReadout {
         self.certain.rest()
     }
 
+    /// Since when what is at rest is outside its noise floor, as [`ReadoutStream::left_floor`].
+    pub(super) fn left_floor(&self) -> Option<LeftFloor> {
+        self.certain.left_floor()
+    }
+
     /// Number of events that arrived out of order.
     pub(super) fn late(&self) -> u64 {
         self.certain.late()
@@ -178,6 +184,7 @@ mod tests {
             rules: BTreeMap::new(),
             by_rule: BTreeSet::new(),
             seen: Default::default(),
+            rest: None,
             training: None,
         };
         SpeculativeReadout::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))

@@ -6,18 +6,19 @@ use crate::detect::{Detector, Readout};
 
 fn rule() -> PlainRule {
     PlainRule {
-        quantity: Quantity::Total,
-        threshold: 1.0 / 3.0,
+        quantity: Quantity::Load,
+        level: 1.0 / 3.0,
         release: 0.1 + 0.2,
-        frames: 20,
+        quiet_ms: 20.0,
+        date: Some(0.7),
+        constant_ms: -0.1,
         levels: vec![],
-        dated_at: None,
-        of_largest: false,
         age_ms: None,
         labels: [Some("contact".to_owned()), None],
         noise_floor: 0.0,
         unit: Some("kPa".to_owned()),
         tare: None,
+        rest: None,
         training: None,
     }
 }
@@ -26,7 +27,7 @@ fn rule() -> PlainRule {
 fn a_file_gives_every_number_back_and_names_its_kind() {
     let rule = rule();
     let text = rule.to_json();
-    assert!(text.starts_with("{\n  \"format\": \"taxel plain rule\",\n  \"version\": 1,"));
+    assert!(text.starts_with("{\n  \"format\": \"taxel plain rule\",\n  \"version\": 2,"));
     assert_eq!(PlainRule::from_json(&text).unwrap(), rule);
     assert_eq!(Detector::from_json(&text).unwrap(), rule.into());
     assert!(matches!(Readout::from_json(&text), Err(Error::Format(_))));
@@ -38,17 +39,16 @@ type Spoil = fn(&mut PlainRule);
 
 #[test]
 fn parts_that_make_no_sense_are_refused_by_name() {
-    let cases: [(Spoil, &str); 11] = [
-        (|r| r.threshold = 0.0, "threshold is 0"),
-        (|r| r.threshold = f64::NAN, "threshold is NaN"),
+    let cases: [(Spoil, &str); 13] = [
+        (|r| r.level = 0.0, "level is 0"),
+        (|r| r.level = f64::NAN, "level is NaN"),
         (|r| r.release = 0.0, "release is 0"),
         (|r| r.release = 1.5, "release is 1.5"),
-        (|r| r.frames = 0, "frames is 0"),
+        (|r| r.quiet_ms = -1.0, "quiet_ms is -1"),
+        (|r| r.constant_ms = 1e6, "constant_ms is 1000000"),
+        (|r| r.date = Some(0.2), "date is 0.2"),
         (|r| r.age_ms = Some(Age::Ms(-1.0)), "age_ms is -1"),
-        (
-            |r| r.age_ms = Some(Age::Ms(1.0)),
-            "release is 0.30000000000000004 and frames is 20: with age_ms both must be 1",
-        ),
+        (|r| r.age_ms = Some(Age::Ms(1.0)), "age_ms is given with a release below 1, a quiet time or a date"),
         (|r| r.noise_floor = f64::INFINITY, "noise_floor is inf"),
         (|r| r.labels = [None, None], "labels are both left out"),
         (|r| r.labels[1] = r.labels[0].clone(), "labels are both contact"),

@@ -31,6 +31,7 @@ fn readout() -> Readout {
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
         seen: Default::default(),
+        rest: None,
         training: None,
     }
 }
