@@ -206,7 +206,9 @@ fn about(
         source_of: vec![],
     };
     if (2..=MOST_SOURCES).contains(&sources.len()) {
-        frames.source_of = (0..array.columns).map(|column| frames.source_at(column)).collect();
+        // An empty column between two sources counts as of the one before.
+        let source_at = |column| frames.sources.partition_point(|source| source.left <= column).saturating_sub(1);
+        frames.source_of = (0..array.columns).map(source_at).collect();
     }
     frames
 }

@@ -98,8 +98,6 @@ class Live:
     guard_frames : float, 0 or more, optional
         How far, in frames, a readout stays behind the host's clock while no events arrive. Default: 3; 5 of a source of
         numbers.
-    gap_frames : float, 0 or more
-        With version 2 of the wire: how many frames to wait at a gap in the sequence: the data may only be late.
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str
@@ -108,15 +106,6 @@ class Live:
         serial port; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer. Up to 1024 lines wait
         for a slow reader; lines without room, or without a reader, are lost and counted. Without a readout nothing is
         sent until one is chosen on the page.
-    kernel_buffer_bytes : int, 0 to 2147483647
-        How much received data may wait in the operating system, bytes.
-    queue_bytes : int, 0 to 2147483647
-        How much received data may wait for the decoder, bytes.
-    readout_events : int, 0 to 2147483647
-        How many events may wait for the readout.
-    gro : bool
-        Let the kernel join several datagrams and hand them over together (`UDP_GRO`). Then each joined piece that the
-        kernel drops counts as one.
     say : callable, optional
         Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
         is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues
@@ -279,9 +268,9 @@ class Live:
         drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or
         None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
-        Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
-        `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +
-        events_dropped; detections = sent + lost + waiting of each destination.
+        Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them that
+        the kernel joined); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events =
+        read_out + events_dropped; detections = sent + lost + waiting of each destination.
         """
         if self._summary is not None:
             return self._summary.counters

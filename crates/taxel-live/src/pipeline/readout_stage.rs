@@ -11,27 +11,23 @@ use super::shared::PipelineShared;
 
 pub(super) struct ReadoutStage {
     /// Whether there is a readout at all.
-    is_on: bool,
+    pub(super) is_on: bool,
     /// The readout, while it runs in this thread.
     readout: Option<RunningReadout>,
     /// A readout that is about to move to its own thread.
-    separated: Option<Box<RunningReadout>>,
+    pub(super) separated: Option<Box<RunningReadout>>,
     /// What is about to be processed: empty between two calls, in memory that is reused.
     input: ReadoutInput,
     /// Without a readout nothing is found.
     nothing: Vec<Detection>,
     /// The time up to which no more events will follow by the promises of version 2 that the readout has received, us.
-    announced: Option<i64>,
+    pub(super) announced: Option<i64>,
 }
 
 impl ReadoutStage {
     pub(super) fn new(readout: Option<RunningReadout>, array: &Array) -> Self {
         let (is_on, input) = (readout.is_some(), ReadoutInput::new(array));
         Self { is_on, readout, separated: None, input, nothing: vec![], announced: None }
-    }
-
-    pub(super) fn is_on(&self) -> bool {
-        self.is_on
     }
 
     /// Publishes its state before the first events.
@@ -48,23 +44,9 @@ impl ReadoutStage {
         }
     }
 
-    /// The readout for that thread, once.
-    pub(super) fn take_separated(&mut self) -> Option<Box<RunningReadout>> {
-        self.separated.take()
-    }
-
     /// Detections that do not wait for output yet.
     pub(super) fn pending_detections(&mut self) -> &mut Vec<Detection> {
         self.readout.as_mut().map_or(&mut self.nothing, |readout| &mut readout.found)
-    }
-
-    pub(super) fn announced_until(&self) -> Option<i64> {
-        self.announced
-    }
-
-    /// Handles a reset of the board: its earlier promises are void.
-    pub(super) fn reset(&mut self) {
-        self.announced = None;
     }
 
     /// Passes events on, with the time before which the board has promised no more; those in `events` are then others.
