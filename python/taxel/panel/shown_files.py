@@ -47,7 +47,7 @@ _Taxels = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class ReadSource:
-    """Hold the frames of a sensor, from column `left` of the array that is shown, with their rest; times in us."""
+    """The frames of a sensor, from column `left` of the array that is shown, with their rest; times in us."""
 
     name: str
     left: int
@@ -64,7 +64,7 @@ class ReadSource:
 
 @dataclass(frozen=True)
 class ReadFrames:
-    """Hold the frames of a recording for its view.
+    """The frames of a recording for its view.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class ReadFrames:
 
 @dataclass(frozen=True)
 class Viewed:
-    """Hold a recording for its view, and what the message `opened` says of it.
+    """A recording for its view, and what the message `opened` says of it.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class Viewed:
 
 @dataclass(frozen=True)
 class Opening:
-    """Hold how a recording is opened that needs options.
+    """How a recording is opened that needs options.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def judged(activity: _core._Activity) -> dict[str, Any]:
 
 
 class FileState(NamedTuple):
-    """Hold what is another once a recording or its layout file was written: the size, bytes, and when that was, ns."""
+    """What is another once a recording or its layout file was written: the size, bytes, and when that was, ns."""
 
     size: int
     written_ns: int
