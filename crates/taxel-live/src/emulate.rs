@@ -12,6 +12,7 @@ use std::time::Instant;
 use serde::Serialize;
 use taxel_core::board::{Board, BoardCounts, Crossed, Flawed, Flaws, Network, NetworkCounts, NetworkFaults};
 use taxel_core::circuit::Chain;
+use taxel_core::contact::Contact;
 use taxel_core::wire::Command;
 use taxel_core::{Array, Stop};
 
@@ -41,6 +42,11 @@ pub trait Touch: Send {
     /// As [`Touch::frame`].
     fn is_last(&mut self, _stop: Stop<'_>) -> Result<bool> {
         Ok(false)
+    }
+
+    /// Touches that became known since the last call, us from the first frame's start; none where they are not known.
+    fn take_contacts(&mut self) -> Vec<Contact> {
+        vec![]
     }
 }
 

@@ -17,7 +17,7 @@ use taxel_live::pipeline::TaxelChange;
 
 use crate::activity::Activity;
 use crate::block::Block;
-use crate::change_file::{BYTES, ChangeFile, Extent};
+use crate::change_file::{BYTES, ChangeFile, TaxelExtent};
 use crate::columns::{COLUMN_US, TimeColumns, column_of};
 use crate::event_rate::EventRate;
 use crate::history::TaxelHistory;
@@ -59,7 +59,7 @@ struct StoredBlock {
     len: usize,
     range: Option<(i64, i64)>,
     /// By taxel; none of a live source, and of a block that has fewer changes than the array has taxels.
-    extents: Option<Vec<Extent>>,
+    extents: Option<Vec<TaxelExtent>>,
     /// Where it begins in the file, if it is there.
     place: Option<u64>,
 }
@@ -129,9 +129,10 @@ impl Index {
         }
         let taxels = self.sensor.array.len();
         let has_extents = matches!(self.kept, Kept::All { .. }) && block.changes.len() >= taxels;
+        let times = || block.changes.iter().map(|change| change.t);
         let stored = StoredBlock {
             len: block.changes.len(),
-            range: range_of(&block.changes),
+            range: times().min().zip(times().max()),
             extents: has_extents.then(|| extents(&block.changes, taxels)),
             place: None,
             block,
@@ -257,7 +258,7 @@ impl Index {
     }
 
     /// First and last time of a block that has extents, us, and that of a taxel.
-    fn extent(&self, number: u64, taxel: usize) -> Result<Option<((i64, i64), Extent)>> {
+    fn extent(&self, number: u64, taxel: usize) -> Result<Option<((i64, i64), TaxelExtent)>> {
         let store = self.store();
         let Some(StoredBlock { len, range, extents: Some(extents), place, .. }) = store.at(number) else {
             return Ok(None);
@@ -313,18 +314,12 @@ impl StoredBlock {
 
     /// Memory that its changes and extents take.
     fn in_memory(&self) -> usize {
-        self.block.changes.len() * BYTES + self.extents.iter().flatten().count() * size_of::<Extent>()
+        self.block.changes.len() * BYTES + self.extents.iter().flatten().count() * size_of::<TaxelExtent>()
     }
 }
 
-/// First and last time of changes, us.
-fn range_of(changes: &[TaxelChange]) -> Option<(i64, i64)> {
-    let times = || changes.iter().map(|change| change.t);
-    times().min().zip(times().max())
-}
-
 /// The extent of each taxel among changes.
-fn extents(changes: &[TaxelChange], taxels: usize) -> Vec<Extent> {
+fn extents(changes: &[TaxelChange], taxels: usize) -> Vec<TaxelExtent> {
     let mut all = vec![[u16::MAX, 0, UNKNOWN]; taxels];
     for &TaxelChange { taxel, ticks, .. } in changes.iter().filter(|change| change.ticks != UNKNOWN) {
         let [least, greatest, last] = &mut all[taxel as usize];

@@ -38,7 +38,8 @@ pub struct Player {
     block: Block,
     applied: usize,
     next: u64,
-    t: i64,
+    /// The time shown, us.
+    pub(crate) t: i64,
 }
 
 impl Player {
@@ -124,10 +125,5 @@ impl Player {
                 return Ok(None);
             }
         }
-    }
-
-    /// The time shown, us.
-    pub fn t(&self) -> i64 {
-        self.t
     }
 }

@@ -24,7 +24,7 @@ const GAP_FRAMES: f64 = 1.0;
 const GUARD_FRAMES: f64 = 3.0;
 
 pub(super) struct DecodeStage {
-    decoder: SenderDecoder,
+    pub(super) decoder: SenderDecoder,
     promise: Promise,
     arrivals: Heartbeats,
     clock: BoardClock,
@@ -220,11 +220,6 @@ impl DecodeStage {
         counters.board.board_us = counters.board.board_us.max(self.events.t.iter().max().copied());
         counters.board.markers += self.events.markers.len() as u64;
         counters.board.marked_start = self.events.markers.last().map(|m| m.start).or(counters.board.marked_start);
-    }
-
-    /// Notes that a recording begins.
-    pub(super) fn begin_recording(&mut self) {
-        self.decoder.begin_recording();
     }
 
     /// Sets the version of the wire to which the board was set; returns whether it is a different one.

@@ -1,7 +1,6 @@
 //! The fourth stage: passes what arrived to the readout, in this thread or through a queue to another one.
 
 use taxel_core::detect::Detection;
-use taxel_core::encode::Zeroing;
 use taxel_core::{Array, Events};
 
 use super::frame_block::FrameBlock;
@@ -17,7 +16,7 @@ pub(super) struct ReadoutStage {
     /// A readout that is about to move to its own thread.
     pub(super) separated: Option<Box<RunningReadout>>,
     /// What is about to be processed: empty between two calls, in memory that is reused.
-    input: ReadoutInput,
+    pub(super) input: ReadoutInput,
     /// Without a readout nothing is found.
     nothing: Vec<Detection>,
     /// The time up to which no more events will follow by the promises of version 2 that the readout has received, us.
@@ -65,24 +64,13 @@ impl ReadoutStage {
         self.pass_on(shared);
     }
 
-    /// Passes a silence on: no data before a time.
-    pub(super) fn process_silence(&mut self, shared: &PipelineShared, quiet: QuietUntil) {
-        self.input.quiet = Some(quiet);
-        self.pass_on(shared);
-    }
-
-    pub(super) fn zero(&mut self, shared: &PipelineShared, zeroings: &[Zeroing]) {
-        self.input.zeroings.extend_from_slice(zeroings);
-        self.pass_on(shared);
-    }
-
     /// Ends the input.
     pub(super) fn close(&mut self, shared: &PipelineShared, quiet: Option<QuietUntil>) {
         (self.input.quiet, self.input.last) = (quiet, true);
         self.pass_on(shared);
     }
 
-    fn pass_on(&mut self, shared: &PipelineShared) {
+    pub(super) fn pass_on(&mut self, shared: &PipelineShared) {
         match &mut self.readout {
             _ if !self.is_on || self.input.is_empty() => {}
             Some(readout) => readout.process(shared, &self.input),

@@ -124,7 +124,8 @@ impl Stages {
         } else {
             let until = self.shared.receiver.silent_until();
             if let (true, Some(quiet)) = (self.readout.is_on, self.source.quiet_until(until)) {
-                self.readout.process_silence(&self.shared, quiet);
+                self.readout.input.quiet = Some(quiet);
+                self.readout.pass_on(&self.shared);
             }
         }
         self.batch = batch;
@@ -209,7 +210,7 @@ impl Decoding for Stages {
         let begins = next.is_some();
         let ended = self.record.switch(next, self.source.held())?;
         if let (true, SourceStage::Board(decode)) = (begins, &mut self.source) {
-            decode.begin_recording();
+            decode.decoder.begin_recording();
         }
         Ok(ended)
     }
@@ -230,7 +231,8 @@ impl Decoding for Stages {
         // Recorded first, so that every zeroing is in the recording.
         self.record.zeroings(&zeroings)?;
         self.shared.published().add_zeroings(&self.shared.options.array, &zeroings);
-        self.readout.zero(&self.shared, &zeroings);
+        self.readout.input.zeroings.extend_from_slice(&zeroings);
+        self.readout.pass_on(&self.shared);
         Ok(zeroings)
     }
 }
