@@ -6,7 +6,6 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,7 @@ _MOST_INDEX = 2**16 - 1
 _WAIT_S = 0.5
 
 
-class Live:
+class Live(contextlib.AbstractContextManager["Live"]):
     """Receive a board's datagrams; record and read them out as they arrive.
 
     It is a context manager, and an iterator of detections that ends after `stop` was called. It works in separate
@@ -498,12 +497,7 @@ class Live:
             self._sources.with_unread(self._summary.counters)
         return self._summary
 
-    def __enter__(self) -> Live:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, _kind: object, error: object, _trace: object) -> None:
         if error is None:
             self.stop()
         elif self._summary is None:
