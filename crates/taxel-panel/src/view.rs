@@ -345,7 +345,7 @@ impl View {
     ///
     /// `Core(Problem)` where nothing is shown, or the view follows the newest data.
     pub fn play(&mut self, speed: Option<f64>) -> Result<()> {
-        let speed = speed.unwrap_or_else(|| self.playback.speed);
+        let speed = speed.unwrap_or(self.playback.speed);
         let t = self.t().ok_or_else(|| problem!("nothing is shown yet"))?;
         if self.is_following() {
             // Playing the live source from now on would be a delay of zero, which is following.
