@@ -378,7 +378,10 @@ def _verdict(recording: Recording) -> str:
 
 def _frames(recording: Recording) -> Viewed:
     sources = _sources(recording)
-    frames = {name: _in_its_unit(sensor) for name, sensor in sources.items()}
+    # In N or kPa where a calibration gives it, else in the file's unit.
+    frames = {
+        name: sensor.frames() if sensor.calibration is None else sensor.calibrated() for name, sensor in sources.items()
+    }
     units = {sensor.unit for sensor in frames.values()}
     if len(units) > 1:
         raise ProblemError(f"{recording.path}: its sources are in {', '.join(sorted(units))}; must be in one unit")
@@ -405,11 +408,6 @@ def _labels_beside(recording: Recording, begin_us: int) -> set[tuple[int | None,
     table = beside(recording.path)
     rows = Labels(table).rows if table.is_file() else ()
     return {(row.t, row.text) for row in (by_clock(row, begin_us) for row in rows)}
-
-
-def _in_its_unit(recording: Recording) -> Frames:
-    """Return frames in N or kPa where a calibration gives it, else in the file's unit."""
-    return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
 def _read(name: str, left: int, frames: Frames, us: int) -> ReadSource:
