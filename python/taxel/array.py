@@ -22,7 +22,7 @@ __all__ = ["Array", "Places", "of_size"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Places:
-    """Hold the place of each taxel of a sensor whose taxels are not evenly spaced.
+    """The place of each taxel of a sensor whose taxels are not evenly spaced.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ _LAST = 2000
 
 @dataclass(frozen=True)
 class Finding:
-    """Hold the result of one check.
+    """The result of one check.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class BoardCheck:
-    """Hold what a check of a board found.
+    """What a check of a board found.
 
     Parameters
     ----------

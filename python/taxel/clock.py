@@ -125,13 +125,9 @@ class Clock:
         k = np.clip(np.searchsorted(board, t, side="right") - 1, 0, len(board) - 2)
         since = t - board[k]
         slope = (host[k + 1] - host[k]) / (board[k + 1] - board[k]) - 1000.0
-        if self._is_one_line:
+        if len(self._lines) == 1:
             slope = np.full(np.shape(k), self._lines[0][1]["drift_ppm"] * 1e-3)
         return host[k] + since * 1000 + np.rint(since * slope).astype(np.int64)
-
-    @property
-    def _is_one_line(self) -> bool:
-        return len(self._lines) == 1
 
     def board_us_at(self, host_ns: int | NDArray[np.int64]) -> Any:
         """Return the source's time (us) at times of the host (ns since 1970).

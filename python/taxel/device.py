@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, integer, number, shown, text
@@ -109,7 +109,7 @@ class Greeting:
     channels: int
 
 
-class Cable:
+class Cable(contextlib.AbstractContextManager["Cable"]):
     """Write a board's registers over its serial line. A context manager.
 
     Parameters
@@ -387,9 +387,6 @@ class Cable:
     def _failed(self, text: str) -> DeviceError:
         return DeviceError(f"{self._name}: {text}")
 
-    def __enter__(self) -> Cable:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -397,7 +394,7 @@ class Cable:
         return escaped(f"Cable({self.place})")
 
 
-class Device:
+class Device(contextlib.AbstractContextManager["Device"]):
     """Set a board by its registers' names, with their units; a context manager.
 
     Registers are read back after they are set. After the cable was pulled, the next call reconnects, and sets the
@@ -562,9 +559,6 @@ class Device:
     def close(self) -> None:
         """Close the line; the board continues."""
         self.cable.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -24,7 +24,7 @@ __all__ = ["Events", "repaired_of"]
 
 
 class Event(NamedTuple):
-    """Hold one change at a taxel.
+    """One change at a taxel.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Event(NamedTuple):
 
 
 class Events(FrozenColumns):
-    """Hold changes at taxels, in the order of their arrival.
+    """Changes at taxels, in the order of their arrival.
 
     Parameters
     ----------

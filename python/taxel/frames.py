@@ -34,7 +34,7 @@ MOST_VALUES = 2**30
 
 
 class Frames(FrozenColumns):
-    """Hold frames of the whole array over time.
+    """Frames of the whole array over time.
 
     Parameters
     ----------

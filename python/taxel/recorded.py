@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class Recorded(Protocol):
-    """Hold events or frames, as `taxel.Recording` does."""
+    """Events or frames, as `taxel.Recording` does."""
 
     @property
     def path(self) -> Path:

@@ -30,7 +30,7 @@ _KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class SpikeTrains(FrozenColumns):
-    """Hold spike times by train, with the window in which spikes were recorded.
+    """Spike times by train, with the window in which spikes were recorded.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _OTHER = re.compile(r'\s*\{\s*"format":\s*"([\w ]+)"')
 
 
 class Tare(Saved):
-    """Hold the rest of each taxel: the time-weighted mean of its held values over an unloaded interval, and its noise.
+    """The rest of each taxel: the time-weighted mean of its held values over an unloaded interval, and its noise.
 
     Made by `Tare.take`, `Tare.load` or `Tare.from_json`. Measure it with the board's noise floor at 0; otherwise a rest
     is no more precise than the noise floor.
@@ -110,10 +110,8 @@ class Tare(Saved):
                 f"tare to {stop_us} us: no events are before this time; the events are from {x.t.min()} to "
                 f"{x.t.max()} us"
             )
-        if isinstance(x, Events):
-            return cls.from_json(_core.tare_of_events(x, *window, note))
-        if isinstance(x, Frames):
-            return cls.from_json(_core.tare_of_frames(x, *window, note))
+        if isinstance(x, Events | Frames):
+            return cls.from_json(_core.take_tare(x, *window, note))
         raise refused("x", f" is {shown(x)}: must be a taxel.Events or taxel.Frames")
 
     def off(self, frames: Frames) -> Frames:

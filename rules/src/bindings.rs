@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns};
+use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns, to_targets};
 use taxel_border::enter::{Exclusive, enter, enter_keeping};
 use taxel_border::errors::core;
 use taxel_border::parameters::{Plain, checked, parsed, unknown};
@@ -43,10 +43,6 @@ fn train(
     };
     let (weights, right) = (column(py, trained.weights), column(py, trained.right));
     Ok(TrainedOut { weights, right, best_epoch: trained.best_epoch, ended, raised })
-}
-
-fn to_targets(targets: &[PyReadonlyArray1<'_, f64>]) -> PyResult<Vec<Vec<f64>>> {
-    targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect()
 }
 
 /// A rule with its neuron and its training, checked, from its name and all parameters in one list.

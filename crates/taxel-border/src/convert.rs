@@ -135,6 +135,34 @@ impl FramesIn<'_> {
     }
 }
 
+/// Events or frames of Python.
+#[derive(FromPyObject)]
+pub enum SensedIn<'py> {
+    /// Events.
+    Events(EventsIn<'py>),
+    /// Frames.
+    Frames(FramesIn<'py>),
+}
+
+/// Events or frames in place.
+#[derive(Clone, Copy)]
+pub enum SensedView<'a> {
+    /// Events.
+    Events(EventsView<'a>),
+    /// Frames.
+    Frames(FramesView<'a>),
+}
+
+impl SensedIn<'_> {
+    /// As [`EventsIn::view`].
+    pub fn view(&self) -> PyResult<SensedView<'_>> {
+        Ok(match self {
+            Self::Events(events) => SensedView::Events(events.view()?),
+            Self::Frames(frames) => SensedView::Frames(frames.view()?),
+        })
+    }
+}
+
 /// Events as Python gets them, by name, on an array that it knows.
 #[derive(IntoPyObject)]
 pub struct EventsOut<'py> {
@@ -209,6 +237,11 @@ impl FromPyObject<'_, '_> for SpikesIn {
 /// The trains of patterns.
 pub fn to_patterns(patterns: Vec<SpikesIn>) -> Vec<SpikeTrains> {
     patterns.into_iter().map(|SpikesIn(pattern)| pattern).collect()
+}
+
+/// The targets of each pattern, ms.
+pub fn to_targets(targets: &[PyReadonlyArray1<'_, f64>]) -> PyResult<Vec<Vec<f64>>> {
+    targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect()
 }
 
 /// Spike trains as Python gets them, by name.

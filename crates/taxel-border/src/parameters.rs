@@ -19,7 +19,18 @@ pub fn parsed<T: DeserializeOwned>(name: &str, json: &str) -> PyResult<T> {
     reading::from_text(json).map_err(|unfit| core(unfit.by_name().problem(name)))
 }
 
-/// Reads the value called `name` from its JSON and checks it; returns it with every default filled in.
+/// As [`parsed`], of a value that `check` finds no fault with.
+///
+/// # Errors
+///
+/// A `ProblemError` that names the parameter.
+pub fn valid<T: DeserializeOwned>(name: &str, json: &str, check: impl Fn(&T) -> CoreResult<()>) -> PyResult<T> {
+    let value = parsed(name, json)?;
+    check(&value).map_err(core)?;
+    Ok(value)
+}
+
+/// As [`valid`]; returns the value with every default filled in.
 ///
 /// # Errors
 ///
@@ -29,9 +40,7 @@ pub fn checked<T: DeserializeOwned + Serialize>(
     json: &str,
     check: impl Fn(&T) -> CoreResult<()>,
 ) -> PyResult<Value> {
-    let value: T = parsed(name, json)?;
-    check(&value).map_err(core)?;
-    Ok(json!(value))
+    valid(name, json, check).map(|value| json!(value))
 }
 
 /// The error of what has no parameters.

@@ -5,7 +5,6 @@
 //! second the earliest point is kept. The line is the edge of the lower convex hull of the last 64 s above their mean
 //! time: of all lines below the points the closest to them.
 
-mod arrival_point;
 mod offset;
 mod pace;
 
@@ -13,9 +12,8 @@ use std::collections::VecDeque;
 
 use taxel_core::wire::{DatagramInfo, WORD_BYTES};
 
-use arrival_point::{ArrivalPoint, LONG_US, STRETCHES};
 pub use offset::Offset;
-use pace::ArrivalDelays;
+use pace::{ArrivalDelays, ArrivalPoint, LONG_US, STRETCHES};
 pub use pace::{Pace, doubt};
 
 /// Duration of a stretch, of which the earliest point is kept, us of the board's clock.

@@ -12,6 +12,7 @@ use std::time::Instant;
 use serde::Serialize;
 use taxel_core::board::{Board, BoardCounts, Crossed, Flawed, Flaws, Network, NetworkCounts, NetworkFaults};
 use taxel_core::circuit::Chain;
+use taxel_core::contact::Contact;
 use taxel_core::wire::Command;
 use taxel_core::{Array, Stop};
 
@@ -21,7 +22,7 @@ use crate::latency::Quantiles;
 use control::CommandPort;
 use pace::wake_sharply;
 pub use replay::Replay;
-use run::BoardRun;
+use run::{BoardRun, POLL_EVERY, REPORT_EVERY, is_due};
 pub use scenes::Scenes;
 
 /// The input that an emulated board scans: a scene, a replayed recording, noise.
@@ -41,6 +42,11 @@ pub trait Touch: Send {
     /// As [`Touch::frame`].
     fn is_last(&mut self, _stop: Stop<'_>) -> Result<bool> {
         Ok(false)
+    }
+
+    /// Touches that became known since the last call, us from the first frame's start; none where they are not known.
+    fn take_contacts(&mut self) -> Vec<Contact> {
+        vec![]
     }
 }
 
@@ -206,7 +212,7 @@ impl Emulator {
             let since_us = run.since_us(&self.board);
             self.reset_where_due(&mut run, since_us)?;
             let frame = self.board.counts().frames;
-            while let Some(command) = run.next_command(frame) {
+            while let Some((_, command)) = run.schedule.next_if(|(at, _)| *at <= frame) {
                 self.board.command(&command.to_bytes());
             }
             if !last {
@@ -217,10 +223,10 @@ impl Emulator {
                 continue;
             }
             let now = self.send_frame(&mut run, &ticks)?;
-            if run.is_poll_due(now) {
+            if is_due(&mut run.polled, now, POLL_EVERY) {
                 self.control.serve(&mut self.board);
             }
-            if run.is_report_due(now) {
+            if is_due(&mut run.reported, now, REPORT_EVERY) {
                 watch(&self.report(&run), touch);
             }
         }

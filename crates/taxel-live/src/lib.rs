@@ -12,7 +12,6 @@ mod named_pipe;
 pub mod ports;
 pub mod read_at;
 pub mod serial_line;
-mod system_error;
 
 pub mod capture;
 pub mod emulate;

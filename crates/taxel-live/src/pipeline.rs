@@ -57,7 +57,7 @@ use taxel_core::wire;
 use taxel_core::wire::Registers;
 use taxel_core::{Stop, problem};
 
-use crate::capture::Receiver;
+use crate::capture::{Receiver, ReceiverOptions};
 use crate::locked::lock;
 use crate::recording::SourceWriter;
 use crate::{Error, Result, address, host_clock};
@@ -126,15 +126,8 @@ impl Live {
 
     /// Starts the pipeline; `part` writes it into the recording of another one.
     fn begin(options: LiveOptions, sinks: Vec<Box<dyn Sink>>, part: Option<SourceWriter>) -> Result<Self> {
-        for (name, frames) in
-            [("guard_frames", options.guard_frames.unwrap_or_default()), ("gap_frames", options.gap_frames)]
-        {
-            if !(frames.is_finite() && frames >= 0.0) {
-                return Err(problem!(name; " is {frames}: must be 0 or more and finite").into());
-            }
-        }
-        if options.readout_events == 0 {
-            return Err(problem!("readout_events"; " is 0: must be 1 or more").into());
+        if let Some(frames) = options.guard_frames.filter(|frames| !(frames.is_finite() && *frames >= 0.0)) {
+            return Err(problem!("guard_frames"; " is {frames}: must be 0 or more and finite").into());
         }
         match options.layout() {
             Some(layout) => layout.check()?,
@@ -148,9 +141,9 @@ impl Live {
         let sending = options.send.iter().map(|to| Sending::open(to)).collect::<Result<Vec<_>>>()?;
         // The socket is opened before the file, so that a port that is in use leaves no empty file.
         let (receiver, frames) = match &options.input {
-            None => (Receiver::bind(options.address()?, options.capture())?, None),
+            None => (Receiver::bind(options.address()?, ReceiverOptions::default())?, None),
             Some(source) => {
-                let (frames, receiver) = FrameInput::new(&source.place, &source.layout, options.capture());
+                let (frames, receiver) = FrameInput::new(&source.place, &source.layout);
                 (receiver, Some(frames))
             }
         };

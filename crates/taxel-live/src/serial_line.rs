@@ -149,9 +149,10 @@ fn open_port(path: &str, baud: u32) -> Result<SerialLine> {
 /// Why a port could not be opened.
 fn unopened(path: &str, error: serialport::Error) -> Error {
     use serialport::ErrorKind::{Io, NoDevice};
+    let is_listed = || ports().is_ok_and(|ports| ports.iter().any(|port| port.place.eq_ignore_ascii_case(path)));
     let source = match error.kind() {
         // In Windows a port that does not exist has this kind too.
-        NoDevice if cfg!(unix) || is_listed(path) => {
+        NoDevice if cfg!(unix) || is_listed() => {
             io::Error::new(ErrorKind::ResourceBusy, "another program has opened this port")
         }
         NoDevice => io::Error::new(ErrorKind::NotFound, error),
@@ -159,10 +160,6 @@ fn unopened(path: &str, error: serialport::Error) -> Error {
         _ => return taxel_core::Error::device(format!("{path}: no serial port ({error})")).into(),
     };
     Error::socket(path)(source)
-}
-
-fn is_listed(path: &str) -> bool {
-    ports().is_ok_and(|ports| ports.iter().any(|port| port.place.eq_ignore_ascii_case(path)))
 }
 
 /// Lets a write return where a port has room for a part of the bytes only: in Unix `serialport` waits for all.

@@ -13,7 +13,7 @@ use taxel_live::{Error, Result};
 /// The least, the greatest and the last value of a taxel among changes; the last is [`UNKNOWN`] where it has none.
 ///
 /// [`UNKNOWN`]: taxel_core::held::UNKNOWN
-pub(super) type Extent = [u16; 3];
+pub(super) type TaxelExtent = [u16; 3];
 
 /// Bytes of a change, in memory and in the file.
 pub(super) const BYTES: usize = size_of::<TaxelChange>();
@@ -51,7 +51,7 @@ impl ChangeFile {
     /// # Errors
     ///
     /// `Core(Problem)` where there is no room.
-    pub(super) fn push(&mut self, changes: &[TaxelChange], extents: &[Extent]) -> Result<u64> {
+    pub(super) fn push(&mut self, changes: &[TaxelChange], extents: &[TaxelExtent]) -> Result<u64> {
         let mut bytes: Vec<u8> = changes.iter().flat_map(to_bytes).collect();
         bytes.extend(extents.iter().flatten().flat_map(|value| value.to_le_bytes()));
         let begin = self.written;
@@ -76,8 +76,8 @@ impl ChangeFile {
     /// # Errors
     ///
     /// `File` where it cannot be read.
-    pub(super) fn extent(&self, begin: u64, count: usize, taxel: usize) -> Result<Extent> {
-        let (mut bytes, at) = ([0; size_of::<Extent>()], count * BYTES + taxel * size_of::<Extent>());
+    pub(super) fn extent(&self, begin: u64, count: usize, taxel: usize) -> Result<TaxelExtent> {
+        let (mut bytes, at) = ([0; size_of::<TaxelExtent>()], count * BYTES + taxel * size_of::<TaxelExtent>());
         read_exact_at(&self.file, &mut bytes, begin + at as u64).map_err(Error::file(&self.folder))?;
         let [a, b, c, d, e, f] = bytes;
         Ok([[a, b], [c, d], [e, f]].map(u16::from_le_bytes))

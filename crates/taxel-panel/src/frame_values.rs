@@ -79,10 +79,3 @@ pub struct Frames {
     /// Number of the source of each column of the array; empty where there is one, or more than have a curve each.
     pub(crate) source_of: Vec<usize>,
 }
-
-impl Frames {
-    /// Number of the source of a column. An empty one between two sources counts as of the one before.
-    pub(crate) fn source_at(&self, column: u16) -> usize {
-        self.sources.partition_point(|source| source.left <= column).saturating_sub(1)
-    }
-}

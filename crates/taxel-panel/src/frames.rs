@@ -58,11 +58,6 @@ impl<'a> SteppedFrames<'a> {
         &self.rests[self.rests.partition_point(|&(from, _)| from <= k).max(1) - 1].1
     }
 
-    /// Whether another rest holds from this frame on.
-    fn rest_moves(&self, k: usize) -> bool {
-        k > 0 && self.rests.binary_search_by_key(&k, |&(from, _)| from).is_ok()
-    }
-
     /// Appends the changes of a frame.
     fn changes(&self, k: usize, to: &mut Vec<TaxelChange>) {
         let (t, before) = (self.given.t[k], k.checked_sub(1).map(|before| self.frame(before)));
@@ -159,7 +154,10 @@ impl Index {
         let mut changes = vec![];
         for together in order.chunk_by(|a, b| time(a) == time(b)) {
             together.iter().for_each(|&(source, k)| sources[source].changes(k, &mut changes));
-            let moves = together.iter().any(|&(source, k)| sources[source].rest_moves(k));
+            let rest_moves = |&(source, k): &(usize, usize)| {
+                k > 0 && sources[source].rests.binary_search_by_key(&k, |&(from, _)| from).is_ok()
+            };
+            let moves = together.iter().any(rest_moves);
             if moves || changes.len() >= CHANGES {
                 let rest = moves.then(|| rest_at(&sources, time(&together[0]), taxels));
                 indexing.push(Block { held: None, changes: std::mem::take(&mut changes).into(), rest })?;
@@ -206,7 +204,9 @@ fn about(
         source_of: vec![],
     };
     if (2..=MOST_SOURCES).contains(&sources.len()) {
-        frames.source_of = (0..array.columns).map(|column| frames.source_at(column)).collect();
+        // An empty column between two sources counts as of the one before.
+        let source_at = |column| frames.sources.partition_point(|source| source.left <= column).saturating_sub(1);
+        frames.source_of = (0..array.columns).map(source_at).collect();
     }
     frames
 }

@@ -17,7 +17,7 @@ use taxel_live::pipeline::TaxelChange;
 
 use crate::activity::Activity;
 use crate::block::Block;
-use crate::change_file::{BYTES, ChangeFile, Extent};
+use crate::change_file::{BYTES, ChangeFile, TaxelExtent};
 use crate::columns::{COLUMN_US, TimeColumns, column_of};
 use crate::event_rate::EventRate;
 use crate::history::TaxelHistory;
@@ -59,8 +59,7 @@ struct StoredBlock {
     len: usize,
     range: Option<(i64, i64)>,
     /// By taxel; none of a live source, and of a block that has fewer changes than the array has taxels.
-    extents: Vec<Extent>,
-    has_extents: bool,
+    extents: Option<Vec<TaxelExtent>>,
     /// Where it begins in the file, if it is there.
     place: Option<u64>,
 }
@@ -130,11 +129,11 @@ impl Index {
         }
         let taxels = self.sensor.array.len();
         let has_extents = matches!(self.kept, Kept::All { .. }) && block.changes.len() >= taxels;
+        let times = || block.changes.iter().map(|change| change.t);
         let stored = StoredBlock {
             len: block.changes.len(),
-            range: range_of(&block.changes),
-            extents: if has_extents { extents(&block.changes, taxels) } else { vec![] },
-            has_extents,
+            range: times().min().zip(times().max()),
+            extents: has_extents.then(|| extents(&block.changes, taxels)),
             place: None,
             block,
         };
@@ -259,14 +258,16 @@ impl Index {
     }
 
     /// First and last time of a block that has extents, us, and that of a taxel.
-    fn extent(&self, number: u64, taxel: usize) -> Result<Option<((i64, i64), Extent)>> {
+    fn extent(&self, number: u64, taxel: usize) -> Result<Option<((i64, i64), TaxelExtent)>> {
         let store = self.store();
-        let Some(stored) = store.at(number).filter(|stored| stored.has_extents) else { return Ok(None) };
-        let extent = match store.file.as_ref().zip(stored.place) {
-            Some((file, begin)) => file.extent(begin, stored.len, taxel)?,
-            None => stored.extents[taxel],
+        let Some(StoredBlock { len, range, extents: Some(extents), place, .. }) = store.at(number) else {
+            return Ok(None);
         };
-        Ok(stored.range.map(|range| (range, extent)))
+        let extent = match store.file.as_ref().zip(*place) {
+            Some((file, begin)) => file.extent(begin, *len, taxel)?,
+            None => extents[taxel],
+        };
+        Ok(range.map(|range| (range, extent)))
     }
 
     /// Number of changes.
@@ -313,18 +314,12 @@ impl StoredBlock {
 
     /// Memory that its changes and extents take.
     fn in_memory(&self) -> usize {
-        self.block.changes.len() * BYTES + size_of_val(&*self.extents)
+        self.block.changes.len() * BYTES + self.extents.iter().flatten().count() * size_of::<TaxelExtent>()
     }
 }
 
-/// First and last time of changes, us.
-fn range_of(changes: &[TaxelChange]) -> Option<(i64, i64)> {
-    let times = || changes.iter().map(|change| change.t);
-    times().min().zip(times().max())
-}
-
 /// The extent of each taxel among changes.
-fn extents(changes: &[TaxelChange], taxels: usize) -> Vec<Extent> {
+fn extents(changes: &[TaxelChange], taxels: usize) -> Vec<TaxelExtent> {
     let mut all = vec![[u16::MAX, 0, UNKNOWN]; taxels];
     for &TaxelChange { taxel, ticks, .. } in changes.iter().filter(|change| change.ticks != UNKNOWN) {
         let [least, greatest, last] = &mut all[taxel as usize];
@@ -356,8 +351,9 @@ impl Store {
         let from = self.blocks.partition_point(|stored| stored.place.is_some());
         for stored in self.blocks.range_mut(from..) {
             self.bytes -= stored.in_memory();
-            let (changes, extents) = (std::mem::take(&mut stored.block.changes), std::mem::take(&mut stored.extents));
-            stored.place = Some(file.push(&changes, &extents)?);
+            let changes = std::mem::take(&mut stored.block.changes);
+            stored.place =
+                Some(file.push(&changes, &stored.extents.iter_mut().flat_map(std::mem::take).collect::<Vec<_>>())?);
         }
         self.file = Some(file);
         Ok(())

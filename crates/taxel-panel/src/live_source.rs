@@ -388,13 +388,13 @@ impl Receiving {
 
     /// Sets the rest of taxels that were zeroed since the last call; returns whether there were any.
     fn apply_zeroings(&mut self, source: &LiveSource) -> bool {
-        let zeroings = source.handle.zeroings();
+        let (latest, zeroings) = source.handle.latest_zeroings();
         if std::mem::replace(&mut self.zeroings, zeroings) == zeroings {
             return false;
         }
         let (array, steps) = (source.array(), source.value_steps());
         let mut state = lock(&source.state);
-        for zeroing in source.handle.latest_zeroings().0 {
+        for zeroing in latest {
             state.zero(array.index(zeroing.x, zeroing.y), steps.of_rest(zeroing.rest));
         }
         true

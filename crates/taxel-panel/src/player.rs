@@ -25,11 +25,6 @@ impl ViewOptions {
     pub fn plain(column_us: i64) -> Self {
         Self { column_us, watched: None }
     }
-
-    /// Whether the columns are narrower than those that are stored of a whole source.
-    pub fn is_narrow(&self) -> bool {
-        self.column_us < COLUMN_US
-    }
 }
 
 /// A source at a time.
@@ -43,7 +38,8 @@ pub struct Player {
     block: Block,
     applied: usize,
     next: u64,
-    t: i64,
+    /// The time shown, us.
+    pub(crate) t: i64,
 }
 
 impl Player {
@@ -57,7 +53,7 @@ impl Player {
         let (first, last) =
             index.range().ok_or_else(|| problem!("nothing to show: the recording contains no events"))?;
         let t = t.clamp(first, last);
-        let whole = whole.or(index.whole.as_ref()).filter(|_| !options.is_narrow());
+        let whole = whole.or(index.whole.as_ref()).filter(|_| options.column_us >= COLUMN_US);
         let (unit_us, span) = (options.column_us.min(COLUMN_US), SPAN * options.column_us);
         let since = |us: i64| t.saturating_sub(us.max(FORGET * COLUMN_US) + LATE_US);
         let (from, next) = index.open(since(if whole.is_none() { span } else { 0 }))?;
@@ -129,10 +125,5 @@ impl Player {
                 return Ok(None);
             }
         }
-    }
-
-    /// The time shown, us.
-    pub fn t(&self) -> i64 {
-        self.t
     }
 }

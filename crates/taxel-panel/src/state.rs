@@ -60,12 +60,6 @@ fn next_track(t: i64) -> i64 {
     (t.div_euclid(TRACK_US) + 1).saturating_mul(TRACK_US)
 }
 
-/// A rest that is tracked from these values on.
-fn tracked_from(columns: usize, values: &[u16]) -> TrackedRest {
-    let rest = |&value: &u16| if value == UNKNOWN { f64::NO_REST } else { value.into() };
-    TrackedRest::new(columns, NOISE_FLOOR, values.iter().map(rest).collect())
-}
-
 /// A sensor and its values, which are the same at all times.
 #[derive(Debug)]
 pub struct Sensor {
@@ -194,7 +188,9 @@ impl ArrayState {
     pub fn new(sensor: &Arc<Sensor>, from: &Keyframe, column_us: i64, most: i64) -> Self {
         let frames = sensor.frames.as_ref();
         let tracked = frames.is_none().then(|| {
-            let anew = || Box::new(tracked_from(sensor.array.columns.into(), &from.rest));
+            let rest = |&value: &u16| if value == UNKNOWN { f64::NO_REST } else { value.into() };
+            let begins = || from.rest.iter().map(rest).collect();
+            let anew = || Box::new(TrackedRest::new(sensor.array.columns.into(), NOISE_FLOOR, begins()));
             from.tracked.clone().unwrap_or_else(anew)
         });
         let all = TimeColumns::new(&sensor.array, sensor.curves(), most);

@@ -90,7 +90,7 @@ impl View {
             (Position::At(_), true) => "playing",
             (Position::At(_), false) => "paused",
         };
-        (state, self.playback.speed(), self.t())
+        (state, self.playback.speed, self.t())
     }
 
     /// Whether [`View::advance`] has work to do before the next frame.
@@ -106,7 +106,7 @@ impl View {
     /// Board time of the view, us.
     fn t(&self) -> Option<i64> {
         match &self.position {
-            Position::At(Some(position)) => Some(position.player.t()),
+            Position::At(Some(position)) => Some(position.player.t),
             Position::At(None) => None,
             Position::Following(_) => self.live.as_ref().and_then(|live| lock(&live.state).latest),
         }
@@ -150,7 +150,7 @@ impl View {
         let Some(t) = self.playback.now() else { return false };
         let moved = self.position().and_then(|position| {
             // A window that the view leaves moves with it.
-            if let Some(window) = position.window.as_mut().filter(|window| window.t() < t) {
+            if let Some(window) = position.window.as_mut().filter(|window| window.t < t) {
                 window.advance(t)?;
             }
             position.player.advance(t)
@@ -286,7 +286,9 @@ impl View {
             _ if self.is_following() => self.begin_following(),
             Some(t) => {
                 self.go(t)?;
-                self.playback.continue_from(t);
+                if self.playback.is_playing() {
+                    self.playback.start(self.playback.speed, t);
+                }
             }
             None => {}
         }
@@ -343,7 +345,7 @@ impl View {
     ///
     /// `Core(Problem)` where nothing is shown, or the view follows the newest data.
     pub fn play(&mut self, speed: Option<f64>) -> Result<()> {
-        let speed = speed.unwrap_or_else(|| self.playback.speed());
+        let speed = speed.unwrap_or(self.playback.speed);
         let t = self.t().ok_or_else(|| problem!("nothing is shown yet"))?;
         if self.is_following() {
             // Playing the live source from now on would be a delay of zero, which is following.
@@ -386,7 +388,7 @@ impl View {
                 let Some(t) = player.next_stamp()? else { break };
                 player.advance(t)?;
             } else {
-                let before = player.t();
+                let before = player.t;
                 let Some(t) = self.index()?.stamp_before(before)? else { break };
                 self.go(t)?;
             }

@@ -7,16 +7,10 @@ use taxel_core::learn::{
 };
 use taxel_core::problem;
 
-use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns};
+use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns, to_targets};
 use taxel_border::enter::{enter, enter_keeping};
 use taxel_border::errors::core;
-use taxel_border::parameters::parsed;
-
-fn to_cone_x(json: &str) -> PyResult<ConeX> {
-    let parameters: ConeX = parsed("ConeX", json)?;
-    parameters.check().map_err(core)?;
-    Ok(parameters)
-}
+use taxel_border::parameters::valid;
 
 /// A row by name: kind, pattern, and target or time (ms).
 type Name = (String, usize, f64);
@@ -115,9 +109,8 @@ impl ConeXProblem {
         patterns: Vec<SpikesIn>,
         targets: Vec<PyReadonlyArray1<'_, f64>>,
     ) -> PyResult<Self> {
-        let parameters = to_cone_x(parameters)?;
-        let patterns = to_patterns(patterns);
-        let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
+        let parameters = valid("ConeX", parameters, ConeX::check)?;
+        let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
         let problem = enter(py, |stop| core_learn::ConeXProblem::new(&parameters, &patterns, &targets, stop))?;
         Ok(Self { problem, max_seconds: parameters.max_seconds })
     }

@@ -6,7 +6,7 @@ use taxel_core::encode::{Encoder, LocalLoad, Pieces, Tare};
 
 use taxel_core::problem;
 
-use taxel_border::convert::{ArrayIn, EventsIn, FramesIn, SpikesOut, from_spikes};
+use taxel_border::convert::{ArrayIn, SensedIn, SensedView, SpikesOut, from_spikes};
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::core;
 
@@ -43,45 +43,29 @@ pub fn local_load_quantities(encoder: &str) -> PyResult<Vec<String>> {
     Ok(local_load(encoder)?.quantities())
 }
 
-/// The quantities of a local load of a whole recording of events, sample by sample.
+/// The quantities of a local load of a whole recording, sample by sample of events, frame by frame of frames.
 #[pyfunction]
-pub fn local_load_of_events<'py>(
+pub fn local_load_values<'py>(
     py: Python<'py>,
     encoder: &str,
-    events: EventsIn<'py>,
+    sensed: SensedIn<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let load = local_load(encoder)?;
-    let events = events.view()?;
-    Ok(PyArray1::from_vec(py, enter(py, |stop| load.values_of_events(events, stop))?))
+    let (load, sensed) = (local_load(encoder)?, sensed.view()?);
+    let values = enter(py, |stop| match sensed {
+        SensedView::Events(events) => load.values_of_events(events, stop),
+        SensedView::Frames(frames) => load.values_of_frames(frames, stop),
+    })?;
+    Ok(PyArray1::from_vec(py, values))
 }
 
-/// The quantities of a local load of a whole recording of frames, frame by frame.
+/// Encodes a whole recording.
 #[pyfunction]
-pub fn local_load_of_frames<'py>(
-    py: Python<'py>,
-    encoder: &str,
-    frames: FramesIn<'py>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let load = local_load(encoder)?;
-    let frames = frames.view()?;
-    Ok(PyArray1::from_vec(py, enter(py, |stop| load.values_of_frames(frames, stop))?))
-}
-
-/// Encodes a whole recording of events.
-#[pyfunction]
-pub fn encode_events<'py>(py: Python<'py>, encoder: &str, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {
-    let encoder = Encoder::from_json(encoder).map_err(core)?;
-    let events = events.view()?;
-    let trains = enter(py, |stop| encoder.encode_events(events, stop))?;
-    Ok(from_spikes(py, trains))
-}
-
-/// Encodes a whole recording of frames.
-#[pyfunction]
-pub fn encode_frames<'py>(py: Python<'py>, encoder: &str, frames: FramesIn<'py>) -> PyResult<SpikesOut<'py>> {
-    let encoder = Encoder::from_json(encoder).map_err(core)?;
-    let frames = frames.view()?;
-    let trains = enter(py, |stop| encoder.encode_frames(frames, stop))?;
+pub fn encode<'py>(py: Python<'py>, encoder: &str, sensed: SensedIn<'py>) -> PyResult<SpikesOut<'py>> {
+    let (encoder, sensed) = (Encoder::from_json(encoder).map_err(core)?, sensed.view()?);
+    let trains = enter(py, |stop| match sensed {
+        SensedView::Events(events) => encoder.encode_events(events, stop),
+        SensedView::Frames(frames) => encoder.encode_frames(frames, stop),
+    })?;
     Ok(from_spikes(py, trains))
 }
 
@@ -97,14 +81,13 @@ impl EncoderStream {
         Ok(Self(Exclusive::new(Pieces::new(&encoder, array.0).map_err(core)?)))
     }
 
-    fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {
-        let events = events.view()?;
-        Ok(from_spikes(py, self.0.enter(py, |pieces, _| pieces.push_events(events))?))
-    }
-
-    fn push_frames<'py>(&self, py: Python<'py>, frames: FramesIn<'py>) -> PyResult<SpikesOut<'py>> {
-        let frames = frames.view()?;
-        Ok(from_spikes(py, self.0.enter(py, |pieces, _| pieces.push_frames(frames))?))
+    fn push<'py>(&self, py: Python<'py>, sensed: SensedIn<'py>) -> PyResult<SpikesOut<'py>> {
+        let sensed = sensed.view()?;
+        let trains = self.0.enter(py, |pieces, _| match sensed {
+            SensedView::Events(events) => pieces.push_events(events),
+            SensedView::Frames(frames) => pieces.push_frames(frames),
+        })?;
+        Ok(from_spikes(py, trains))
     }
 
     /// How many events came too far behind the time come to.
@@ -122,30 +105,21 @@ impl EncoderStream {
     }
 }
 
-/// Takes a tare from events, as JSON; times in us.
+/// Takes a tare, as JSON; times in us.
 #[pyfunction]
-pub fn tare_of_events(
+pub fn take_tare(
     py: Python<'_>,
-    events: EventsIn<'_>,
+    sensed: SensedIn<'_>,
     start: Option<i64>,
     stop: Option<i64>,
     note: &str,
 ) -> PyResult<String> {
-    let events = events.view()?;
-    Ok(enter(py, |_| Tare::of_events(events, start, stop, note))?.to_json())
-}
-
-/// Takes a tare from frames, as JSON; times in us.
-#[pyfunction]
-pub fn tare_of_frames(
-    py: Python<'_>,
-    frames: FramesIn<'_>,
-    start: Option<i64>,
-    stop: Option<i64>,
-    note: &str,
-) -> PyResult<String> {
-    let frames = frames.view()?;
-    Ok(enter(py, |_| Tare::of_frames(frames, start, stop, note))?.to_json())
+    let sensed = sensed.view()?;
+    let tare = enter(py, |_| match sensed {
+        SensedView::Events(events) => Tare::of_events(events, start, stop, note),
+        SensedView::Frames(frames) => Tare::of_frames(frames, start, stop, note),
+    })?;
+    Ok(tare.to_json())
 }
 
 /// Checks a tare; gives it back as the compiled part writes it.

@@ -8,16 +8,10 @@ use taxel_core::learn::{ConeR, ConeRFit, Fit, Left, Round, Shares};
 use taxel_core::problem;
 
 use crate::cone_x::{ProofOut, proof_out};
-use taxel_border::convert::{Column, SpikesIn, column, slice, to_patterns};
+use taxel_border::convert::{Column, SpikesIn, column, slice, to_patterns, to_targets};
 use taxel_border::enter::{Exclusive, enter, enter_keeping};
 use taxel_border::errors::core;
-use taxel_border::parameters::parsed;
-
-pub(crate) fn to_cone_r(json: &str) -> PyResult<ConeR> {
-    let parameters: ConeR = parsed("ConeR", json)?;
-    parameters.check().map_err(core)?;
-    Ok(parameters)
-}
+use taxel_border::parameters::{parsed, valid};
 
 /// The parameters of [`ConeR`], and how many patterns the window holds.
 pub(crate) fn to_online(json: &str) -> PyResult<(ConeR, usize)> {
@@ -25,7 +19,7 @@ pub(crate) fn to_online(json: &str) -> PyResult<(ConeR, usize)> {
     let window = parameters.remove("window").unwrap_or(Value::Null);
     let window = window.as_u64().and_then(|window| usize::try_from(window).ok());
     let window = window.ok_or_else(|| core(problem!("window"; ": must be a whole number, 1 or more")))?;
-    Ok((to_cone_r(&Value::Object(parameters).to_string())?, window))
+    Ok((valid("ConeR", &Value::Object(parameters).to_string(), ConeR::check)?, window))
 }
 
 /// Multipliers of a start as Python holds them: rows, and a share each.
@@ -67,9 +61,8 @@ impl ConeRProblem {
         targets: Vec<PyReadonlyArray1<'_, f64>>,
         silence: Vec<Option<PyReadonlyArray1<'_, f64>>>,
     ) -> PyResult<Self> {
-        let parameters = to_cone_r(parameters)?;
-        let patterns = to_patterns(patterns);
-        let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
+        let parameters = valid("ConeR", parameters, ConeR::check)?;
+        let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
         let silence = silence.iter().map(to_windows).collect::<PyResult<Vec<_>>>()?;
         enter(py, |stop| core_learn::ConeRProblem::new(&parameters, &patterns, &targets, &silence, stop)).map(Self)
     }
@@ -95,7 +88,7 @@ impl ConeRProblem {
         start: Option<StartIn<'_>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<ConeRFitOut> {
-        let parameters = to_cone_r(parameters)?;
+        let parameters = valid("ConeR", parameters, ConeR::check)?;
         let silent = slice("silent", &silent)?;
         let start = start.as_ref().map(to_start).transpose()?;
         let start = start.as_ref().map(|(weights, multipliers)| (*weights, multipliers.as_ref()));

@@ -53,8 +53,8 @@ mod _core {
     use crate::device::{SerialLine, line_place, now_ns, serial_ports, status_line};
     #[pymodule_export]
     use crate::encode::{
-        EncoderStream, check_encoder, check_tare, encode_events, encode_frames, encoder_about, encoder_names,
-        local_load_of_events, local_load_of_frames, local_load_quantities, tare_of_events, tare_of_frames,
+        EncoderStream, check_encoder, check_tare, encode, encoder_about, encoder_names, local_load_quantities,
+        local_load_values, take_tare,
     };
     #[pymodule_export]
     use crate::held::{

@@ -8,7 +8,6 @@ use std::time::Duration;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use taxel_core::detect::Detection;
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::problem;
 use taxel_live::address::of_host;
@@ -24,18 +23,6 @@ use taxel_border::convert::{array, slice};
 use taxel_border::enter::enter;
 use taxel_border::errors::{ProblemError, core};
 use taxel_border::parameters::{Plain, parsed};
-
-/// A detection, by name: `reported` is the time of its report in us of the board's clock, `reported_ns` in ns of the host's.
-#[derive(IntoPyObject)]
-pub(crate) struct DetectionOut {
-    label: String,
-    t: i64,
-    known: i64,
-    slope: f64,
-    reported: i64,
-    reported_ns: i64,
-    repaired: bool,
-}
 
 /// How a pipeline, or one of its recordings, ended.
 #[pyclass(frozen, get_all)]
@@ -57,15 +44,6 @@ impl From<LiveSummary> for Ended {
             tare: summary.tare.as_ref().map(Tare::to_json),
         }
     }
-}
-
-fn to_record(path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Record> {
-    Ok(Record { path, compression: compression.parse().map_err(core)?, overwrite })
-}
-
-fn detection_out(output: OutputDetection) -> DetectionOut {
-    let Detection { label, t, known, slope, repaired } = output.detection;
-    DetectionOut { label, t, known, slope, reported: output.reported_us, reported_ns: output.reported_ns, repaired }
 }
 
 thread_local! {
@@ -114,7 +92,7 @@ impl Live {
             sinks.push(Box::new(move |output: &OutputDetection| {
                 thread_state::attach(|py| {
                     IN_CALLBACK.set(true);
-                    let outcome = say.call1(py, (detection_out(output.clone()),));
+                    let outcome = say.call1(py, (Plain(output),));
                     IN_CALLBACK.set(false);
                     outcome.map(drop)
                 })
@@ -140,14 +118,14 @@ impl Live {
     }
 
     /// The next detection; None after `timeout` seconds without one, or when all is over.
-    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<DetectionOut>> {
+    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<Plain<OutputDetection>>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
         let output = enter(py, |stop| match self.pipeline.read().as_ref() {
             Some(pipeline) => pipeline.wait(timeout, stop),
             None => Ok(None),
         })?;
-        Ok(output.map(detection_out))
+        Ok(output.map(Plain))
     }
 
     /// Whether the pipeline has ended.
@@ -269,7 +247,7 @@ impl Live {
 
     /// Records what comes from here on; returns how a recording that ran ended.
     fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<Ended>> {
-        let record = to_record(path, compression, overwrite)?;
+        let record = Record { path, compression: compression.parse().map_err(core)?, overwrite };
         let ended = self.with(py, |pipeline| match pipeline.options().record_later {
             true => pipeline.record(&record),
             false => Err(problem!("record: give record_later at the start to begin recordings later").into()),

@@ -6,14 +6,7 @@ use taxel_core::neuron::Neuron;
 
 use taxel_border::convert::{SpikesIn, array, slice};
 use taxel_border::enter::enter;
-use taxel_border::errors::core;
-use taxel_border::parameters::parsed;
-
-pub(crate) fn to_neuron(json: &str) -> PyResult<Neuron> {
-    let neuron: Neuron = parsed("neuron", json)?;
-    neuron.check().map_err(core)?;
-    Ok(neuron)
-}
+use taxel_border::parameters::valid;
 
 /// Times (ms) and slopes (mV/ms) of output spikes.
 type OutputSpikes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -27,7 +20,7 @@ pub fn neuron_run<'py>(
     trains: SpikesIn,
     threshold: f64,
 ) -> PyResult<OutputSpikes<'py>> {
-    let (neuron, SpikesIn(trains)) = (to_neuron(parameters)?, trains);
+    let (neuron, SpikesIn(trains)) = (valid("neuron", parameters, Neuron::check)?, trains);
     let weights = slice("weights", &weights)?;
     let spikes = enter(py, |stop| neuron.run(weights, &trains, threshold, stop))?;
     let (times, slopes) = spikes.iter().map(|s| (s.t, s.slope)).unzip();
@@ -44,7 +37,7 @@ pub fn neuron_potential<'py>(
     times: PyReadonlyArray1<'py, f64>,
     spikes: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (neuron, SpikesIn(trains)) = (to_neuron(parameters)?, trains);
+    let (neuron, SpikesIn(trains)) = (valid("neuron", parameters, Neuron::check)?, trains);
     let (weights, times, spikes) = (slice("weights", &weights)?, slice("times", &times)?, slice("spikes", &spikes)?);
     let potential = enter(py, |stop| neuron.potential(weights, &trains, times, spikes, stop))?;
     Ok(array(py, potential))

@@ -9,7 +9,7 @@ use taxel_core::board::{self, Board, Crossed, Flaws, IntensityWord, NetworkFault
 use taxel_core::circuit::Chain;
 use taxel_core::contact::{Act, Bonded, Contact, Foam, FrameSequence, Motion, Narrow, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
-use taxel_core::{Error, Result, Stop, reading};
+use taxel_core::{Error, Result, reading};
 use taxel_live::address::of_text;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Replay, Report, Scenes, Touch};
 
@@ -211,28 +211,6 @@ impl Iterator for Acts {
     }
 }
 
-/// A touch of any kind; acts also give the touches that are known so far.
-enum Felt {
-    Scenes(Box<Scenes>),
-    Other(Box<dyn Touch>),
-}
-
-impl Touch for Felt {
-    fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> taxel_live::Result<bool> {
-        match self {
-            Self::Scenes(scenes) => scenes.frame(ticks, stop),
-            Self::Other(touch) => touch.frame(ticks, stop),
-        }
-    }
-
-    fn is_last(&mut self, stop: Stop<'_>) -> taxel_live::Result<bool> {
-        match self {
-            Self::Scenes(scenes) => scenes.is_last(stop),
-            Self::Other(touch) => touch.is_last(stop),
-        }
-    }
-}
-
 /// Plays a touch to an emulated board that sends its datagrams to `to`, in real time; gives the report.
 ///
 /// `options` is JSON. `begun` is called with the address for commands once the board is ready, `watch` ten times a second
@@ -257,18 +235,18 @@ pub fn emulate(
     if let (TouchIn::Acts(_), Some(circuit)) = (&touch, &chosen.circuit) {
         Crossed::fits(circuit, &sensor).map_err(core)?;
     }
-    let mut touch = match touch {
+    let mut touch: Box<dyn Touch> = match touch {
         TouchIn::Acts(iterator) => {
             let taxels = Taxels::new(&sensor, array.len(), registers.ramp, seed).map_err(core)?;
-            Felt::Scenes(Box::new(enter(py, |_| Scenes::new(&array, taxels, frame_us, Acts(iterator)))?))
+            Box::new(enter(py, |_| Scenes::new(&array, taxels, frame_us, Acts(iterator)))?)
         }
         TouchIn::Events(events, speed) => {
             let events = events.view()?;
-            Felt::Other(Box::new(enter(py, |_| Replay::events(events, (frame_us, speed), step, registers.ramp))?))
+            Box::new(enter(py, |_| Replay::events(events, (frame_us, speed), step, registers.ramp))?)
         }
         TouchIn::Frames(t, values, speed) => {
             let (t, values) = (slice("t", &t)?.to_vec(), slice("values", &values)?.to_vec());
-            Felt::Other(Box::new(enter(py, |_| Replay::frames(&array, t, values, frame_us, speed))?))
+            Box::new(enter(py, |_| Replay::frames(&array, t, values, frame_us, speed))?)
         }
     };
     enter_with_progress(py, |stop, caller| {
@@ -293,12 +271,9 @@ pub fn emulate(
         let control = emulator.control_address().map(|a| a.to_string());
         caller.call(Some(&begun), |py, function| function.call1(py, (control,)));
         let report = emulator.run(
-            &mut touch,
+            &mut *touch,
             |report, touch| {
-                let contacts = match touch {
-                    Felt::Scenes(scenes) => scenes.take_contacts(),
-                    Felt::Other(_) => vec![],
-                };
+                let contacts = touch.take_contacts();
                 caller.call(Some(&watch), |py, function| function.call1(py, (Plain(report), Plain(contacts))));
             },
             stop,

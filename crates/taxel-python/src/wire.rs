@@ -30,6 +30,21 @@ enum VersionedDecoder {
 #[pyclass(module = "taxel._core", frozen)]
 pub struct WireDecoder(Exclusive<VersionedDecoder>);
 
+impl WireDecoder {
+    /// What waits in a decoder of version 1; nothing does in one of version 2.
+    fn rest<'py>(&self, py: Python<'py>, release: fn(&mut Decoder, &mut Events)) -> EventsOut<'py> {
+        let events = self.0.with(py, |decoder| match decoder {
+            VersionedDecoder::One(decoder) => {
+                let mut events = Events::empty(decoder.array().clone());
+                release(decoder, &mut events);
+                events
+            }
+            VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
+        });
+        from_events(py, events)
+    }
+}
+
 #[pymethods]
 impl WireDecoder {
     /// `differences` is of version 1 alone: datagrams of version 2 state it themselves.
@@ -85,28 +100,12 @@ impl WireDecoder {
 
     /// Releases the change that waits for its intensity.
     fn end_of_datagram<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
-        let events = self.0.with(py, |decoder| match decoder {
-            VersionedDecoder::One(decoder) => {
-                let mut events = Events::empty(decoder.array().clone());
-                decoder.end_of_datagram(&mut events);
-                events
-            }
-            VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
-        });
-        from_events(py, events)
+        self.rest(py, Decoder::end_of_datagram)
     }
 
     /// Ends the stream; returns the rest.
     fn finish<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
-        let events = self.0.with(py, |decoder| match decoder {
-            VersionedDecoder::One(decoder) => {
-                let mut events = Events::empty(decoder.array().clone());
-                decoder.finish(&mut events);
-                events
-            }
-            VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
-        });
-        from_events(py, events)
+        self.rest(py, Decoder::finish)
     }
 
     /// The version's counts.

@@ -195,9 +195,7 @@ class Encoder(Value):
         SpikeTrains(1 train, 1 spike, signed, 0 to 1 ms)
         """
         x = recorded(x)
-        if isinstance(x, Events):
-            return SpikeTrains._of_own(**_core.encode_events(self._json(), x))
-        return SpikeTrains._of_own(**_core.encode_frames(self._json(), frames_of(x)))
+        return SpikeTrains._of_own(**_core.encode(self._json(), x if isinstance(x, Events) else frames_of(x)))
 
     def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
         """Return the encoder itself, which learns nothing; a scikit-learn pipeline calls `fit` of each step.
@@ -331,10 +329,8 @@ class EncoderStream:
         >>> stream.push(Frames([[[0.0]]], [0])).times, stream.push(Frames([[[12.0]]], [1000])).times
         (array([], dtype=float64), array([1.]))
         """
-        if isinstance(x, Events):
-            return SpikeTrains._of_own(**self._begin(x.array).push_events(x))
-        frames = frames_of(x)
-        return SpikeTrains._of_own(**self._begin(frames.array).push_frames(frames))
+        sensed = x if isinstance(x, Events) else frames_of(x)
+        return SpikeTrains._of_own(**self._begin(sensed.array).push(sensed))
 
     def advance(self, t_us: int) -> SpikeTrains:
         """Advance the stream's time: after this call no event before `t_us` is pushed.

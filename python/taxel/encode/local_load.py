@@ -149,8 +149,6 @@ class LocalLoad(Tared):
         (1, 21)
         """
         encoder, source = self._with_rest_of(recorded(x))
-        if isinstance(source, Events):
-            values = _core.local_load_of_events(encoder._json(), source)
-        else:
-            values = _core.local_load_of_frames(encoder._json(), frames_of(source))
+        sensed = source if isinstance(source, Events) else frames_of(source)
+        values = _core.local_load_values(encoder._json(), sensed)
         return values.reshape(-1, len(self.quantities))

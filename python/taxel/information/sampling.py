@@ -72,7 +72,7 @@ class HeldValues:
 
 @dataclass(frozen=True, eq=False)
 class SampledEvents:
-    """Hold the events of all trials, sampled at one period and one draw of its phases.
+    """The events of all trials, sampled at one period and one draw of its phases.
 
     Attributes
     ----------

@@ -243,7 +243,7 @@ class ConeR(SpikeLearner):
 
 
 class ConeRProblem:
-    """Hold the rows of one set of examples; made by `ConeR.prepare`.
+    """The rows of one set of examples; made by `ConeR.prepare`.
 
     Parameters
     ----------

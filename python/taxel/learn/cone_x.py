@@ -165,7 +165,7 @@ class Multipliers:
 
 
 class Margin(NamedTuple):
-    """Hold the distance below the threshold that silence keeps.
+    """The distance below the threshold that silence keeps.
 
     Parameters
     ----------

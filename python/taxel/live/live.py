@@ -6,7 +6,6 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,7 @@ _MOST_INDEX = 2**16 - 1
 _WAIT_S = 0.5
 
 
-class Live:
+class Live(contextlib.AbstractContextManager["Live"]):
     """Receive a board's datagrams; record and read them out as they arrive.
 
     It is a context manager, and an iterator of detections that ends after `stop` was called. It works in separate
@@ -101,8 +100,6 @@ class Live:
     guard_frames : float, 0 or more, optional
         How far, in frames, a readout stays behind the host's clock while no events arrive. Default: 3; 5 of a source of
         numbers.
-    gap_frames : float, 0 or more
-        With version 2 of the wire: how many frames to wait at a gap in the sequence: the data may only be late.
     lines : bool
         Print one line of JSON for each detection, and nothing else.
     send : str or sequence of str
@@ -111,15 +108,6 @@ class Live:
         serial port; "lsl:NAME" sends the label in a stream of markers of the lab streaming layer. Up to 1024 lines wait
         for a slow reader; lines without room, or without a reader, are lost and counted. Without a readout nothing is
         sent until one is chosen on the page.
-    kernel_buffer_bytes : int, 0 to 2147483647
-        How much received data may wait in the operating system, bytes.
-    queue_bytes : int, 0 to 2147483647
-        How much received data may wait for the decoder, bytes.
-    readout_events : int, 0 to 2147483647
-        How many events may wait for the readout.
-    gro : bool
-        Let the kernel join several datagrams and hand them over together (`UDP_GRO`). Then each joined piece that the
-        kernel drops counts as one.
     say : callable, optional
         Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
         is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues
@@ -284,9 +272,9 @@ class Live:
         `left_floor` (of frames whose rest has left the noise floor of the training: since_us, and how many taxels'
         at most; else None).
 
-        Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
-        `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +
-        events_dropped; detections = sent + lost + waiting of each destination.
+        Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them that
+        the kernel joined); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events =
+        read_out + events_dropped; detections = sent + lost + waiting of each destination.
         """
         if self._summary is not None:
             return self._summary.counters
@@ -514,12 +502,7 @@ class Live:
             self._sources.with_unread(self._summary.counters)
         return self._summary
 
-    def __enter__(self) -> Live:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, _kind: object, error: object, _trace: object) -> None:
         if error is None:
             self.stop()
         elif self._summary is None:

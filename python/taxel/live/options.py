@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """Hold the options of a `Live`, which documents each, with their defaults."""
+    """The options of a `Live`, which documents each, with their defaults."""
 
     port: int | None = option(
         None,
@@ -98,12 +98,6 @@ class LiveOptions:
         "of numbers.",
         least=0,
     )
-    gap_frames: float = option(
-        1.0,
-        "With version 2 of the wire: how many frames to wait at a gap in the sequence: the data may only be late.",
-        least=0,
-        commands="",
-    )
     lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
     send: str | Sequence[str] = option(
         (),
@@ -111,22 +105,6 @@ class LiveOptions:
         "lines+udp:HOST:PORT.",
         metavar="WHERE",
         typed="May be repeated.",
-    )
-    kernel_buffer_bytes: int = option(
-        33554432,
-        "How much received data may wait in the operating system, bytes.",
-        least=0,
-        most=2_147_483_647,
-        commands="",
-    )
-    queue_bytes: int = option(
-        67108864, "How much received data may wait for the decoder, bytes.", least=0, most=2_147_483_647, commands=""
-    )
-    readout_events: int = option(
-        1048576, "How many events may wait for the readout.", least=0, most=2_147_483_647, commands=""
-    )
-    gro: bool = option(
-        True, "Let the kernel join several datagrams and hand them over together (`UDP_GRO`).", commands=""
     )
     say: Callable[[Detection], object] | None = option(None, "Called with each detection.", commands="")
 

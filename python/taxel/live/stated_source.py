@@ -29,7 +29,7 @@ _OF_LINES = ("array", "baud", "time", "columns", "leave_out", "by", "frame_lines
 
 @dataclass(frozen=True)
 class StatedSource:
-    """Hold what is stated of a source.
+    """What is stated of a source.
 
     Parameters
     ----------

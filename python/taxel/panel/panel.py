@@ -6,7 +6,6 @@ import contextlib
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
 
 from taxel._base.arguments import callback, checked_path, instance, integer, text
 from taxel._base.errors import refused
@@ -24,7 +23,7 @@ from taxel.recording.frames import period_us
 from taxel.recording.kinds import check_recording, is_folder, recordings_in
 
 
-class Panel:
+class Panel(contextlib.AbstractContextManager["Panel"]):
     """Serve the live panel until it is stopped; a context manager.
 
     A separate thread serves all clients. A client that reads slowly, or never, delays neither the others nor what is
@@ -145,12 +144,7 @@ class Panel:
             self._server.stop()
             self._hub.close()
 
-    def __enter__(self) -> Panel:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def __repr__(self) -> str:

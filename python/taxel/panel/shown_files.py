@@ -47,7 +47,7 @@ _Taxels = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class ReadSource:
-    """Hold the frames of a sensor, from column `left` of the array that is shown, with their rest; times in us."""
+    """The frames of a sensor, from column `left` of the array that is shown, with their rest; times in us."""
 
     name: str
     left: int
@@ -64,7 +64,7 @@ class ReadSource:
 
 @dataclass(frozen=True)
 class ReadFrames:
-    """Hold the frames of a recording for its view.
+    """The frames of a recording for its view.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class ReadFrames:
 
 @dataclass(frozen=True)
 class Viewed:
-    """Hold a recording for its view, and what the message `opened` says of it.
+    """A recording for its view, and what the message `opened` says of it.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class Viewed:
 
 @dataclass(frozen=True)
 class Opening:
-    """Hold how a recording is opened that needs options.
+    """How a recording is opened that needs options.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def judged(activity: _core._Activity) -> dict[str, Any]:
 
 
 class FileState(NamedTuple):
-    """Hold what is another once a recording or its layout file was written: the size, bytes, and when that was, ns."""
+    """What is another once a recording or its layout file was written: the size, bytes, and when that was, ns."""
 
     size: int
     written_ns: int
@@ -378,7 +378,10 @@ def _verdict(recording: Recording) -> str:
 
 def _frames(recording: Recording) -> Viewed:
     sources = _sources(recording)
-    frames = {name: _in_its_unit(sensor) for name, sensor in sources.items()}
+    # In N or kPa where a calibration gives it, else in the file's unit.
+    frames = {
+        name: sensor.frames() if sensor.calibration is None else sensor.calibrated() for name, sensor in sources.items()
+    }
     units = {sensor.unit for sensor in frames.values()}
     if len(units) > 1:
         raise ProblemError(f"{recording.path}: its sources are in {', '.join(sorted(units))}; must be in one unit")
@@ -405,11 +408,6 @@ def _labels_beside(recording: Recording, begin_us: int) -> set[tuple[int | None,
     table = beside(recording.path)
     rows = Labels(table).rows if table.is_file() else ()
     return {(row.t, row.text) for row in (by_clock(row, begin_us) for row in rows)}
-
-
-def _in_its_unit(recording: Recording) -> Frames:
-    """Return frames in N or kPa where a calibration gives it, else in the file's unit."""
-    return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
 def _read(name: str, left: int, frames: Frames, us: int) -> ReadSource:

@@ -30,7 +30,7 @@ _THESIS_LINES = 64
 
 @dataclass(frozen=True)
 class Version2:
-    """Hold the options of a board that sends version 2 of the wire.
+    """The options of a board that sends version 2 of the wire.
 
     Parameters
     ----------

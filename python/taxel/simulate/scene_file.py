@@ -46,7 +46,7 @@ _LONGEST_MS = 60_000.0
 
 @dataclass(frozen=True)
 class SceneFile:
-    """Hold the contents of a scene file.
+    """The contents of a scene file.
 
     Attributes
     ----------

@@ -102,7 +102,7 @@ class Command:
 
 
 class Registers:
-    """Hold the values of the board's registers, checked against the rules.
+    """The values of the board's registers, checked against the rules.
 
     "Line" is the driven line, the outer step of the scan; "step" the inner one, the multiplexer's. The manual's names
     (`row_change_period`, `ramp_time`, `nrows` ...) are aliases, in the manual's units (10 ns, ticks, lines less one).

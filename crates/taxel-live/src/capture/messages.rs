@@ -20,7 +20,7 @@ impl MessageFeed {
 
     /// Adds a message that arrived at `arrived_ns` (ns since 1970); [`MessageFeed::send`] passes it on.
     pub fn push(&mut self, arrived_ns: i64, bytes: &[u8]) {
-        self.batch.push_arrived(arrived_ns, bytes);
+        self.batch.push(arrived_ns, 0, bytes);
     }
 
     /// Queues the messages that were added, and promises that all that arrived before `until_ns` are among them.

@@ -70,15 +70,11 @@ impl Batch {
         }
     }
 
-    /// Adds a datagram that arrived at `arrived_ns`.
-    pub(super) fn push_arrived(&mut self, arrived_ns: i64, bytes: &[u8]) {
-        self.push(Datagram { arrived_ns, number: 0, start: 0, end: 0 }, bytes);
-    }
-
-    fn push(&mut self, datagram: Datagram, bytes: &[u8]) {
+    /// Adds a datagram of this number that arrived at `arrived_ns`.
+    pub(super) fn push(&mut self, arrived_ns: i64, number: u64, bytes: &[u8]) {
         let start = self.bytes.len();
         self.bytes.extend_from_slice(bytes);
-        self.datagrams.push(Datagram { start, end: self.bytes.len(), ..datagram });
+        self.datagrams.push(Datagram { arrived_ns, number, start, end: self.bytes.len() });
     }
 
     fn clear(&mut self) {
@@ -138,7 +134,7 @@ impl BatchQueue {
         } else {
             for (number, (datagram, bytes)) in (first..).zip(received.iter()) {
                 if waiting.bytes.len() + bytes.len() <= self.limit {
-                    waiting.push(Datagram { number, ..*datagram }, bytes);
+                    waiting.push(datagram.arrived_ns, number, bytes);
                 } else {
                     counts.dropped_by_queue += 1;
                     counts.bytes_dropped_by_queue += bytes.len() as u64;

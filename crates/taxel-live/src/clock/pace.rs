@@ -4,9 +4,16 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
-use super::arrival_point::{ArrivalPoint, LONG_US, STRETCHES};
 use super::offset::Offset;
 use crate::latency::{Latencies, Quantiles};
+
+/// Board time in us, and arrival minus board time in ns.
+pub(super) type ArrivalPoint = (i64, i64);
+
+/// Number of stretches from which the line is fitted: 64 s, within which the rate of a quartz is constant.
+pub(super) const STRETCHES: usize = 256;
+/// Duration beyond which a slope larger than that of a quartz is accepted, us.
+pub(super) const LONG_US: i64 = 10_000_000;
 
 /// Reading: no two clocks differ by more (crystals by 0.01 %, the worst oscillators by 1 %), ppm.
 const MOST_DRIFT_PPM: f64 = 10_000.0;

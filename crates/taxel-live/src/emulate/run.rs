@@ -11,10 +11,10 @@ use crate::latency::Latencies;
 use crate::recording::now_ns;
 
 /// How often commands are read.
-const POLL_EVERY: Duration = Duration::from_millis(1);
+pub(super) const POLL_EVERY: Duration = Duration::from_millis(1);
 
 /// How often the caller gets a report.
-const REPORT_EVERY: Duration = Duration::from_millis(100);
+pub(super) const REPORT_EVERY: Duration = Duration::from_millis(100);
 
 /// How often two clocks are read; the pair read within the shortest time counts.
 const READINGS: usize = 16;
@@ -37,9 +37,11 @@ pub(super) struct BoardRun {
     /// The board's own clock at the start, us.
     started_us: f64,
     host_s_per_us: f64,
-    schedule: Peekable<std::vec::IntoIter<(u64, Command)>>,
-    polled: Instant,
-    reported: Instant,
+    /// The commands that are still to be executed.
+    pub(super) schedule: Peekable<std::vec::IntoIter<(u64, Command)>>,
+    /// When commands were last read, and the caller last got a report.
+    pub(super) polled: Instant,
+    pub(super) reported: Instant,
 }
 
 impl BoardRun {
@@ -75,11 +77,6 @@ impl BoardRun {
         self.started_us + self.before_reset_us + board.time_us()
     }
 
-    /// The next command of the schedule that is due before this frame.
-    pub(super) fn next_command(&mut self, frame: u64) -> Option<Command> {
-        self.schedule.next_if(|(at, _)| *at <= frame).map(|(_, command)| command)
-    }
-
     /// Moves on to when the frame that the board has scanned ends; returns how long it is.
     pub(super) fn next_due(&mut self, board: &Board) -> Duration {
         let before = self.due;
@@ -93,20 +90,10 @@ impl BoardRun {
         self.late.note(i64::try_from(behind.as_nanos()).unwrap_or(i64::MAX));
         self.late_frames += u64::from(behind > frame);
     }
-
-    /// Whether commands are to be read now.
-    pub(super) fn is_poll_due(&mut self, now: Instant) -> bool {
-        is_due(&mut self.polled, now, POLL_EVERY)
-    }
-
-    /// Whether the caller is to get a report now.
-    pub(super) fn is_report_due(&mut self, now: Instant) -> bool {
-        is_due(&mut self.reported, now, REPORT_EVERY)
-    }
 }
 
 /// Whether so long has passed since `last`, which is then set to now.
-fn is_due(last: &mut Instant, now: Instant, interval: Duration) -> bool {
+pub(super) fn is_due(last: &mut Instant, now: Instant, interval: Duration) -> bool {
     let due = now.duration_since(*last) >= interval;
     if due {
         *last = now;

@@ -56,14 +56,6 @@ impl Scenes {
         Ok(Self { stage, coming, over: false, reported: 0 })
     }
 
-    /// Touches of the acts that were prepared since the last call, us from the first frame's start.
-    pub fn take_contacts(&mut self) -> Vec<Contact> {
-        let contacts = self.stage.contacts();
-        let new = contacts[self.reported..].to_vec();
-        self.reported = contacts.len();
-        new
-    }
-
     /// Waits until there is a frame to play; returns false if there are no more, or if the caller stops.
     fn is_ready(&mut self, stop: Stop<'_>) -> Result<bool> {
         while !self.over && self.stage.is_over() {
@@ -79,6 +71,13 @@ impl Scenes {
 }
 
 impl Touch for Scenes {
+    fn take_contacts(&mut self) -> Vec<Contact> {
+        let contacts = self.stage.contacts();
+        let new = contacts[self.reported..].to_vec();
+        self.reported = contacts.len();
+        new
+    }
+
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool> {
         Ok(self.is_ready(stop)? && self.stage.frame(ticks, stop)?)
     }

@@ -17,11 +17,14 @@ use crate::recording::now_ns;
 /// per frame.
 const TICK: Duration = Duration::from_micros(500);
 
+/// How long to wait at a gap in the sequence of version 2, frames: the data may only be late.
+const GAP_FRAMES: f64 = 1.0;
+
 /// How far the readout stays behind the host's clock in a silence, unless that is stated, frames.
 const GUARD_FRAMES: f64 = 3.0;
 
 pub(super) struct DecodeStage {
-    decoder: SenderDecoder,
+    pub(super) decoder: SenderDecoder,
     promise: Promise,
     arrivals: Heartbeats,
     clock: BoardClock,
@@ -30,16 +33,15 @@ pub(super) struct DecodeStage {
     /// When the latest datagram with events could leave the board, us, and when it arrived, ns since 1970.
     sent: Option<(i64, i64)>,
     /// Events that were decoded and not passed on yet.
-    events: Events,
-    held: Held,
+    pub(super) events: Events,
+    pub(super) held: Held,
     /// The board's time of the latest datagram, us.
-    latest: Option<i64>,
-    frame_us: f64,
+    pub(super) latest: Option<i64>,
+    pub(super) frame_us: f64,
     guard_frames: f64,
-    gap_frames: f64,
     /// Whether any intensity has arrived: from then on every piece has the column, so that a lost one is one missing value.
     has_intensities: bool,
-    decoded: u64,
+    pub(super) decoded: u64,
     late: u64,
 }
 
@@ -119,7 +121,6 @@ impl DecodeStage {
             latest: None,
             frame_us: options.registers.frame_us(),
             guard_frames: options.guard_frames.unwrap_or(GUARD_FRAMES),
-            gap_frames: options.gap_frames,
             has_intensities: false,
             decoded: 0,
             late: 0,
@@ -159,7 +160,7 @@ impl DecodeStage {
             let announced = announced.filter(|_| !info.reset);
             let late = self.events.t[*row..].iter().filter(|&&t| announced.is_some_and(|until| t < until));
             self.late += late.count() as u64;
-            self.promise.note(info, arrived_ns / 1000, (self.gap_frames * self.frame_us) as i64);
+            self.promise.note(info, arrived_ns / 1000, (GAP_FRAMES * self.frame_us) as i64);
         }
         let last = self.events.t[*row..].last().copied();
         let left = leaves(info, last, *bytes, self.frame_us());
@@ -187,14 +188,6 @@ impl DecodeStage {
     /// The time before which the board has newly promised no more events, us.
     pub(super) fn take_promise(&mut self) -> Option<i64> {
         self.promise.until.take()
-    }
-
-    pub(super) fn events(&self) -> &Events {
-        &self.events
-    }
-
-    pub(super) fn events_mut(&mut self) -> &mut Events {
-        &mut self.events
     }
 
     /// Clears the events that were passed on.
@@ -229,11 +222,6 @@ impl DecodeStage {
         counters.board.marked_start = self.events.markers.last().map(|m| m.start).or(counters.board.marked_start);
     }
 
-    /// Notes that a recording begins.
-    pub(super) fn begin_recording(&mut self) {
-        self.decoder.begin_recording();
-    }
-
     /// Sets the version of the wire to which the board was set; returns whether it is a different one.
     pub(super) fn expect(&mut self, version: u8) -> bool {
         let changed = version != self.decoder.version();
@@ -243,28 +231,9 @@ impl DecodeStage {
         changed
     }
 
-    /// Number of decoded datagrams.
-    pub(super) fn datagram_count(&self) -> u64 {
-        self.decoded
-    }
-
-    /// The taxels' values.
-    pub(super) fn held(&self) -> &Held {
-        &self.held
-    }
-
-    /// The board's time of the latest datagram, us.
-    pub(super) fn latest(&self) -> Option<i64> {
-        self.latest
-    }
-
     #[allow(clippy::cast_possible_truncation)]
     fn frame_us(&self) -> i64 {
         self.frame_us as i64
-    }
-
-    pub(super) fn set_frame_us(&mut self, frame_us: f64) {
-        self.frame_us = frame_us;
     }
 
     /// How long to wait for data before the readout's time is advanced; only for version 1, which has no promises. Until the

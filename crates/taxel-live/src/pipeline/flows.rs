@@ -30,21 +30,21 @@ impl EventFlow<'_> {
                 let later = self.decode.split_at_reset(&mut decoded);
                 self.flush()?;
                 self.decode.reset(&later);
-                self.viewers.iter_mut().for_each(|queue| queue.reset(self.decode.held()));
+                self.viewers.iter_mut().for_each(|queue| queue.reset(&self.decode.held));
                 if decoded.info.version == 2 {
-                    self.readout.reset();
+                    self.readout.announced = None;
                 }
             }
             let now = now_ns();
-            self.decode.note(&decoded, self.readout.announced_until());
+            self.decode.note(&decoded, self.readout.announced);
             self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
-            if self.record.awaits_origin()
+            if self.record.awaits_origin
                 && let Some(origin_us) = self.decode.origin(&decoded)
             {
                 self.record.set_origin(origin_us)?;
             }
             self.shared.published().decode_latency.note(now - decoded.arrived_ns);
-            if self.decode.events().len() >= FLUSH_AFTER {
+            if self.decode.events.len() >= FLUSH_AFTER {
                 // A batch has this many events only if reading out is slower than they arrive.
                 self.readout.move_to_thread();
                 self.flush()?;
@@ -56,15 +56,15 @@ impl EventFlow<'_> {
     /// Passes the decoded events to the other stages.
     pub(super) fn flush(&mut self) -> Result<()> {
         self.decode.update_held();
-        self.viewers.iter_mut().for_each(|queue| queue.push(self.decode.events(), self.decode.held()));
-        self.record.markers(&self.decode.events().markers)?;
+        self.viewers.iter_mut().for_each(|queue| queue.push(&self.decode.events, &self.decode.held));
+        self.record.markers(&self.decode.events.markers)?;
         {
             let mut published = self.shared.published();
-            published.markers.extend_from_slice(&self.decode.events().markers);
+            published.markers.extend_from_slice(&self.decode.events.markers);
             self.decode.publish(&mut published.counters);
         }
         let promised = self.decode.take_promise();
-        self.readout.push(self.shared, self.decode.events_mut(), promised);
+        self.readout.push(self.shared, &mut self.decode.events, promised);
         self.decode.clear();
         Ok(())
     }
@@ -81,7 +81,7 @@ pub(super) struct FrameFlow<'a> {
 impl FrameFlow<'_> {
     pub(super) fn read(self, batch: &Batch) {
         if self.stage.push(batch) {
-            self.viewers.iter_mut().for_each(|queue| queue.reset(self.stage.held()));
+            self.viewers.iter_mut().for_each(|queue| queue.reset(&self.stage.held));
         }
         {
             let (now, mut published) = (now_ns(), self.shared.published());

@@ -11,7 +11,7 @@ use super::frame_block::write_message;
 use super::frame_times::FrameTimes;
 use super::source::FrameLayout;
 use crate::Result;
-use crate::capture::{MessageFeed, Origin, Receiver, ReceiverOptions};
+use crate::capture::{MessageFeed, Origin, Receiver};
 use crate::locked::lock;
 use crate::recording::{Cause, Counts, Found, now_ns};
 
@@ -97,8 +97,8 @@ struct InputState {
 
 impl FrameInput {
     /// The input, and what a pipeline receives of it.
-    pub(super) fn new(place: &str, layout: &FrameLayout, options: ReceiverOptions) -> (Arc<Self>, Receiver) {
-        let (receiver, feed) = Receiver::of_messages(Origin::Frames(place.to_owned()), options);
+    pub(super) fn new(place: &str, layout: &FrameLayout) -> (Arc<Self>, Receiver) {
+        let (receiver, feed) = Receiver::of_messages(Origin::Frames(place.to_owned()));
         let times = FrameTimes::new(layout);
         let state = Mutex::new(InputState { times, lines: 0, feed, message: vec![], trouble: None });
         (Arc::new(Self { taxels: layout.array.len(), state }), receiver)

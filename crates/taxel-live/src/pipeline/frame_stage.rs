@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::ValueSteps;
-use taxel_core::{Array, Events, Intensities};
+use taxel_core::{Events, Intensities};
 
 use super::counters::Counters;
 use super::frame_block::{FrameBlock, read_message};
@@ -34,12 +34,12 @@ pub(super) struct FrameStage {
     columns: usize,
     frames: FrameBlock,
     /// The values of the last frame, and of the one before it.
-    last: Vec<f32>,
+    pub(super) last: Vec<f32>,
     before: Vec<f32>,
     steps: Option<ValueSteps>,
     noise: FirstNoise,
-    recent: RecentFrames,
-    held: Held,
+    pub(super) recent: RecentFrames,
+    pub(super) held: Held,
     /// The changes of `held` with these frames.
     changes: Events,
     clock: BoardClock,
@@ -48,7 +48,7 @@ pub(super) struct FrameStage {
     first: Option<i64>,
     /// Time of the last frame, us, and its arrival, ns since 1970.
     latest: Option<(i64, i64)>,
-    count: u64,
+    pub(super) count: u64,
 }
 
 impl FrameStage {
@@ -67,7 +67,7 @@ impl FrameStage {
             noise: FirstNoise::new(array.len()),
             recent: RecentFrames::default(),
             held: Held::unknown(array.len()),
-            changes: no_changes(array),
+            changes: Events { intensity: Some(Intensities::default()), ..Events::empty(array.clone()) },
             clock: BoardClock::default(),
             pace: None,
             first: None,
@@ -151,28 +151,9 @@ impl FrameStage {
         self.changes.intensity.get_or_insert_default();
     }
 
-    pub(super) fn held(&self) -> &Held {
-        &self.held
-    }
-
     /// The steps of the values, and the time of the first frame, us.
     pub(super) fn steps(&self) -> Option<(ValueSteps, i64)> {
         self.steps.zip(self.first)
-    }
-
-    /// The values of the last frame.
-    pub(super) fn last(&self) -> &[f32] {
-        &self.last
-    }
-
-    /// The rest of a taxel that nothing touches now: the median of its last second; none without a value.
-    pub(super) fn rest_now(&self, taxel: usize) -> Option<f64> {
-        self.recent.middle(taxel)
-    }
-
-    /// Number of frames.
-    pub(super) fn count(&self) -> u64 {
-        self.count
     }
 
     /// Writes the stage's counts.
@@ -236,8 +217,4 @@ impl FirstNoise {
         #[allow(clippy::cast_precision_loss)]
         Some((*square / (2.0 * NOISE_FRAMES as f64)).sqrt())
     }
-}
-
-fn no_changes(array: &Array) -> Events {
-    Events { intensity: Some(Intensities::default()), ..Events::empty(array.clone()) }
 }

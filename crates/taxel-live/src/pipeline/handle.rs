@@ -55,7 +55,7 @@ impl Handle {
     /// Whether the pipeline has ended, by [`Live::end`](super::Live::end) or by an error, and everything was processed.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.shared.ended.load(Ordering::Acquire)
+        self.shared.has_ended()
     }
 
     /// Counts of what arrived, how it was processed and what was lost, so far.
@@ -329,12 +329,6 @@ impl Handle {
     #[must_use]
     pub fn rest(&self) -> Vec<Option<f64>> {
         self.shared.published().rest.clone()
-    }
-
-    /// Number of zeroings.
-    #[must_use]
-    pub fn zeroings(&self) -> u64 {
-        self.shared.published().zeroings
     }
 }
 

@@ -10,7 +10,7 @@ use taxel_core::wire::Registers;
 
 use super::source::{FrameLayout, FrameSource, NamedSource};
 use crate::address::of_host;
-use crate::capture::{Origin, ReceiverOptions};
+use crate::capture::Origin;
 use crate::recording::{Compression, Decoding, Header, now_ns};
 
 /// Where a board is received if nothing else is stated.
@@ -51,20 +51,17 @@ pub struct LiveOptions {
     pub overwrite: bool,
     /// How far, in frames, a readout stays behind the host's clock while no events arrive; each kind of source has a default.
     pub guard_frames: Option<f64>,
-    /// With version 2 of the wire: how many frames to wait at a gap in the sequence.
-    pub gap_frames: f64,
     /// Print one line of JSON for each detection.
     pub lines: bool,
     /// Where each detection is sent as a line of JSON.
     pub send: Vec<String>,
-    /// How much received data may wait in the operating system, bytes.
-    pub kernel_buffer_bytes: usize,
-    /// How much received data may wait for the decoder, bytes.
-    pub queue_bytes: usize,
-    /// How many events may wait for the readout.
+    /// How many events may wait for the readout; for tests.
+    #[serde(skip, default = "readout_events")]
     pub readout_events: usize,
-    /// Let the kernel join several datagrams and hand them over together (`UDP_GRO`).
-    pub gro: bool,
+}
+
+fn readout_events() -> usize {
+    1 << 20
 }
 
 /// What a user states of the taxels' rest.
@@ -114,13 +111,6 @@ impl LiveOptions {
     /// `Core(Problem)` if there is no such host.
     pub fn address(&self) -> crate::Result<SocketAddr> {
         of_host(self.host.as_deref().unwrap_or(HOST), self.port.unwrap_or(PORT))
-    }
-
-    /// The socket and the queue behind it.
-    #[must_use]
-    pub fn capture(&self) -> ReceiverOptions {
-        let &Self { kernel_buffer_bytes, queue_bytes, gro, .. } = self;
-        ReceiverOptions { kernel_buffer_bytes, queue_bytes, gro }
     }
 
     /// The recording from the beginning, if any.

@@ -1,7 +1,6 @@
 //! The fourth stage: passes what arrived to the readout, in this thread or through a queue to another one.
 
 use taxel_core::detect::Detection;
-use taxel_core::encode::Zeroing;
 use taxel_core::{Array, Events};
 
 use super::frame_block::FrameBlock;
@@ -11,27 +10,23 @@ use super::shared::PipelineShared;
 
 pub(super) struct ReadoutStage {
     /// Whether there is a readout at all.
-    is_on: bool,
+    pub(super) is_on: bool,
     /// The readout, while it runs in this thread.
     readout: Option<RunningReadout>,
     /// A readout that is about to move to its own thread.
-    separated: Option<Box<RunningReadout>>,
+    pub(super) separated: Option<Box<RunningReadout>>,
     /// What is about to be processed: empty between two calls, in memory that is reused.
-    input: ReadoutInput,
+    pub(super) input: ReadoutInput,
     /// Without a readout nothing is found.
     nothing: Vec<Detection>,
     /// The time up to which no more events will follow by the promises of version 2 that the readout has received, us.
-    announced: Option<i64>,
+    pub(super) announced: Option<i64>,
 }
 
 impl ReadoutStage {
     pub(super) fn new(readout: Option<RunningReadout>, array: &Array) -> Self {
         let (is_on, input) = (readout.is_some(), ReadoutInput::new(array));
         Self { is_on, readout, separated: None, input, nothing: vec![], announced: None }
-    }
-
-    pub(super) fn is_on(&self) -> bool {
-        self.is_on
     }
 
     /// Publishes its state before the first events.
@@ -48,23 +43,9 @@ impl ReadoutStage {
         }
     }
 
-    /// The readout for that thread, once.
-    pub(super) fn take_separated(&mut self) -> Option<Box<RunningReadout>> {
-        self.separated.take()
-    }
-
     /// Detections that do not wait for output yet.
     pub(super) fn pending_detections(&mut self) -> &mut Vec<Detection> {
         self.readout.as_mut().map_or(&mut self.nothing, |readout| &mut readout.found)
-    }
-
-    pub(super) fn announced_until(&self) -> Option<i64> {
-        self.announced
-    }
-
-    /// Handles a reset of the board: its earlier promises are void.
-    pub(super) fn reset(&mut self) {
-        self.announced = None;
     }
 
     /// Passes events on, with the time before which the board has promised no more; those in `events` are then others.
@@ -83,24 +64,13 @@ impl ReadoutStage {
         self.pass_on(shared);
     }
 
-    /// Passes a silence on: no data before a time.
-    pub(super) fn process_silence(&mut self, shared: &PipelineShared, quiet: QuietUntil) {
-        self.input.quiet = Some(quiet);
-        self.pass_on(shared);
-    }
-
-    pub(super) fn zero(&mut self, shared: &PipelineShared, zeroings: &[Zeroing]) {
-        self.input.zeroings.extend_from_slice(zeroings);
-        self.pass_on(shared);
-    }
-
     /// Ends the input.
     pub(super) fn close(&mut self, shared: &PipelineShared, quiet: Option<QuietUntil>) {
         (self.input.quiet, self.input.last) = (quiet, true);
         self.pass_on(shared);
     }
 
-    fn pass_on(&mut self, shared: &PipelineShared) {
+    pub(super) fn pass_on(&mut self, shared: &PipelineShared) {
         match &mut self.readout {
             _ if !self.is_on || self.input.is_empty() => {}
             Some(readout) => readout.process(shared, &self.input),

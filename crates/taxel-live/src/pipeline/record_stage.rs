@@ -23,7 +23,7 @@ pub(super) const COUNTS_EVERY: Duration = Duration::from_secs(1);
 pub(super) struct RecordStage {
     shared: Arc<PipelineShared>,
     /// Whether it is not known yet where the recording begins on the board's clock.
-    awaits_origin: bool,
+    pub(super) awaits_origin: bool,
     /// When the last preview was recorded, and the number of decoded datagrams then.
     previewed: Instant,
     considered: u64,
@@ -75,11 +75,6 @@ impl RecordStage {
             return Ok(());
         }
         self.with(|recording| markers.iter().try_for_each(|marker| recording.marker(now_ns(), *marker)))
-    }
-
-    /// Whether it is not known yet where the recording begins on the board's clock.
-    pub(super) fn awaits_origin(&self) -> bool {
-        self.awaits_origin
     }
 
     /// Records where the recording begins on the board's clock, us.

@@ -114,11 +114,6 @@ impl PipelineShared {
         self.requested.store(true, Ordering::Release);
     }
 
-    /// Notes that everything that arrived was processed.
-    pub(super) fn end(&self) {
-        self.ended.store(true, Ordering::Release);
-    }
-
     /// Has the decoding thread do something, and returns what that gives; an error of it ends nothing.
     ///
     /// # Errors

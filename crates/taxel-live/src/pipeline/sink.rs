@@ -2,16 +2,19 @@
 
 use std::fmt::Write as _;
 
+use serde::Serialize;
 use taxel_core::detect::Detection;
 
 /// A detection, and the time of its output.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutputDetection {
     /// The detection.
+    #[serde(flatten)]
     pub detection: Detection,
     /// Time of the output by the host's clock, ns since 1970.
     pub reported_ns: i64,
     /// Time of the output by the board's clock: `reported_ns` converted with the estimated offset; us.
+    #[serde(rename = "reported")]
     pub reported_us: i64,
 }
 

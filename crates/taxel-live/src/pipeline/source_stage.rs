@@ -17,16 +17,16 @@ pub(super) enum SourceStage {
 impl SourceStage {
     pub(super) fn held(&self) -> &Held {
         match self {
-            Self::Board(decode) => decode.held(),
-            Self::Frames(frames) => frames.held(),
+            Self::Board(decode) => &decode.held,
+            Self::Frames(frames) => &frames.held,
         }
     }
 
     /// Number of datagrams or frames.
     pub(super) fn count(&self) -> u64 {
         match self {
-            Self::Board(decode) => decode.datagram_count(),
-            Self::Frames(frames) => frames.count(),
+            Self::Board(decode) => decode.decoded,
+            Self::Frames(frames) => frames.count,
         }
     }
 
@@ -48,8 +48,8 @@ impl SourceStage {
     /// The rest of a taxel that nothing touches now: the held value of a board, the median of a noisy source's last second.
     pub(super) fn rest_now(&self, taxel: usize) -> Option<f64> {
         match self {
-            Self::Board(decode) => Some(decode.held().values()[taxel]).filter(|&held| held != UNKNOWN).map(f64::from),
-            Self::Frames(frames) => frames.rest_now(taxel),
+            Self::Board(decode) => Some(decode.held.values()[taxel]).filter(|&held| held != UNKNOWN).map(f64::from),
+            Self::Frames(frames) => frames.recent.middle(taxel),
         }
     }
 }

@@ -94,7 +94,7 @@ impl Stages {
             }
         }
         loop {
-            if let Some(readout) = self.readout.take_separated() {
+            if let Some(readout) = self.readout.separated.take() {
                 return Ok(StagesOutcome::MoveReadout(readout));
             }
             if !self.pending_detections().is_empty() {
@@ -110,21 +110,22 @@ impl Stages {
 
     /// Moves receiving and reading out to separate threads, because a disk may delay this one.
     fn move_to_threads(&mut self) -> Result<()> {
-        self.shared.receiver.receive_in_thread(if self.readout.is_on() { Duration::ZERO } else { GATHER })?;
+        self.shared.receiver.receive_in_thread(if self.readout.is_on { Duration::ZERO } else { GATHER })?;
         self.readout.move_to_thread();
         Ok(())
     }
 
     fn step(&mut self) -> Result<()> {
-        let tick = if self.readout.is_on() { self.source.tick() } else { None };
+        let tick = if self.readout.is_on { self.source.tick() } else { None };
         let mut batch = std::mem::take(&mut self.batch);
         if self.shared.receiver.receive(&mut batch, tick.map_or(IDLE, |tick| tick.min(IDLE)))? {
             self.process(&batch)?;
             self.record.with(|recording| recording.batch(&batch))?;
         } else {
             let until = self.shared.receiver.silent_until();
-            if let (true, Some(quiet)) = (self.readout.is_on(), self.source.quiet_until(until)) {
-                self.readout.process_silence(&self.shared, quiet);
+            if let (true, Some(quiet)) = (self.readout.is_on, self.source.quiet_until(until)) {
+                self.readout.input.quiet = Some(quiet);
+                self.readout.pass_on(&self.shared);
             }
         }
         self.batch = batch;
@@ -145,7 +146,7 @@ impl Stages {
         let mut published = self.shared.published();
         published.frame.iter_mut().zip(self.source.held().frame()).for_each(|(shown, value)| *shown = value);
         if let SourceStage::Frames(frames) = &self.source {
-            frames.last().clone_into(&mut published.values);
+            frames.last.clone_into(&mut published.values);
         }
     }
 
@@ -173,7 +174,7 @@ impl Stages {
         };
         self.record.previews(self.source.count(), self.source.held(), true)?;
         self.viewers.retain_mut(|queue| queue.tick(self.source.held()));
-        self.readout.close(&self.shared, quiet.filter(|_| self.readout.is_on()));
+        self.readout.close(&self.shared, quiet.filter(|_| self.readout.is_on));
         self.answer()
     }
 
@@ -187,7 +188,7 @@ impl Stages {
 impl Decoding for Stages {
     fn note_registers(&mut self, registers: &Registers) -> Result<()> {
         if let SourceStage::Board(decode) = &mut self.source {
-            decode.set_frame_us(registers.frame_us());
+            decode.frame_us = registers.frame_us();
         }
         self.expect_version(registers.wire_version)?;
         self.record.with(|recording| recording.registers(now_ns(), registers))
@@ -209,7 +210,7 @@ impl Decoding for Stages {
         let begins = next.is_some();
         let ended = self.record.switch(next, self.source.held())?;
         if let (true, SourceStage::Board(decode)) = (begins, &mut self.source) {
-            decode.begin_recording();
+            decode.decoder.begin_recording();
         }
         Ok(ended)
     }
@@ -218,19 +219,20 @@ impl Decoding for Stages {
         if let SourceStage::Board(decode) = &mut self.source
             && decode.expect(version)
         {
-            let (change, t_us) = (BoardChangeKind::Wire { version, asked: true }, decode.latest());
+            let (change, t_us) = (BoardChangeKind::Wire { version, asked: true }, decode.latest);
             self.record.with(|recording| recording.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))?;
         }
         Ok(())
     }
 
     fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
-        let (announced, rest_now) = (self.readout.announced_until(), |taxel| self.source.rest_now(taxel));
+        let (announced, rest_now) = (self.readout.announced, |taxel| self.source.rest_now(taxel));
         let zeroings = self.shared.published().zeroings_of(&self.shared.options.array, taxels, announced, rest_now)?;
         // Recorded first, so that every zeroing is in the recording.
         self.record.zeroings(&zeroings)?;
         self.shared.published().add_zeroings(&self.shared.options.array, &zeroings);
-        self.readout.zero(&self.shared, &zeroings);
+        self.readout.input.zeroings.extend_from_slice(&zeroings);
+        self.readout.pass_on(&self.shared);
         Ok(zeroings)
     }
 }

@@ -7,6 +7,7 @@
 //! A disk may delay a recording, and a readout may be slower than the events arrive. In these cases one thread receives
 //! (or reads what a third one received), decodes and records, and the other reads out from then on.
 
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -86,7 +87,7 @@ impl Threads {
 impl Drop for Threads {
     /// Both threads have ended.
     fn drop(&mut self) {
-        self.shared.end();
+        self.shared.ended.store(true, Ordering::Release);
     }
 }
 

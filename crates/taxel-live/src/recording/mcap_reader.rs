@@ -5,7 +5,6 @@
 //! an invalid record the walk continues at the next valid chunk; the bytes between are counted.
 
 mod blocks;
-mod message;
 mod remarks;
 mod walk;
 
@@ -25,7 +24,6 @@ use super::{
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
-pub use message::Message;
 pub use remarks::Remarks;
 use remarks::begin_with;
 use walk::FileWalk;
@@ -44,17 +42,25 @@ pub struct Reader {
     memory: u64,
 }
 
+/// One message of a file, undecoded.
+#[derive(Debug, Clone, Copy)]
+pub struct Message<'a> {
+    /// Channel of the message.
+    pub topic: Topic,
+    /// Arrival number of a datagram.
+    pub number: u64,
+    /// Time by the host's clock, ns since 1970.
+    pub at_ns: i64,
+    /// Content of the message.
+    pub data: &'a [u8],
+}
+
 /// State between blocks: the file's channels, and the last arrival number.
 #[derive(Debug, Default)]
 struct ReadPosition {
     topics: BTreeMap<u16, Option<Topic>>,
     last: u64,
     bytes: Vec<u8>,
-}
-
-/// The topic of what a source sends.
-fn data_of(source: &Header) -> Topic {
-    if source.frames.is_some() { Topic::Frames } else { Topic::Datagrams }
 }
 
 /// A recording's datagrams as they arrived, stored one after the other.
@@ -223,7 +229,7 @@ impl Reader {
     /// What is known of the file and of this source's messages, of which `remarks` were found, with so many bad chunks.
     #[must_use]
     pub fn condition(&self, remarks: &Remarks, bad_chunks: u64) -> Condition {
-        let data = data_of(self.header());
+        let data = if self.header().frames.is_some() { Topic::Frames } else { Topic::Datagrams };
         let read = |topic: Topic| remarks.messages.get(&topic).copied().unwrap_or(0);
         // A source of which nothing came has no counts in a file that was finished.
         let is_silent = self.source > 0 && read(data) == 0 && !self.rebuilt.unfinished;

@@ -331,7 +331,7 @@ impl SourceWriter {
         let is_small = ticks.iter().all(|&ticks| ticks <= u8::MAX.into());
         let encoding = if is_small { FrameEncoding::Byte } else { FrameEncoding::Whole };
         let preview = message(&self.name, t_us, self.columns, &values, encoding);
-        self.push(Topic::Pressure, at_ns, 0, &preview)
+        self.push(Topic::Pressure, at_ns, &preview)
     }
 
     /// Writes the taxels' values before the recording's first datagram, ticks by taxel index; 65 535 for a taxel
@@ -348,11 +348,11 @@ impl SourceWriter {
     }
 
     fn push_json(&self, topic: Topic, at_ns: i64, value: &serde_json::Value) -> Result<()> {
-        self.push(topic, at_ns, 0, value.to_string().as_bytes())
+        self.push(topic, at_ns, value.to_string().as_bytes())
     }
 
-    fn push(&self, topic: Topic, at_ns: i64, number: u64, bytes: &[u8]) -> Result<()> {
-        self.queue.push(self.source, topic, (at_ns, number), bytes, QUEUE_BYTES)
+    fn push(&self, topic: Topic, at_ns: i64, bytes: &[u8]) -> Result<()> {
+        self.queue.push(self.source, topic, (at_ns, 0), bytes, QUEUE_BYTES)
     }
 }
 
@@ -368,12 +368,8 @@ impl Drop for Writer {
 /// A message that viewers show as a line of text.
 fn log(at_ns: i64, t_us: Option<i64>, text: &str) -> serde_json::Value {
     json!({
-        "timestamp": time(at_ns), "level": 2, "message": text, "name": "taxel", "file": "", "line": 0, "t_us": t_us,
+        "timestamp": { "sec": at_ns.max(0) / 1_000_000_000, "nsec": at_ns.max(0) % 1_000_000_000 }, "level": 2, "message": text, "name": "taxel", "file": "", "line": 0, "t_us": t_us,
     })
-}
-
-fn time(at_ns: i64) -> serde_json::Value {
-    json!({ "sec": at_ns.max(0) / 1_000_000_000, "nsec": at_ns.max(0) % 1_000_000_000 })
 }
 
 #[cfg(test)]

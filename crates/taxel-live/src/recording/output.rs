@@ -12,11 +12,17 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::io::{Error as IoError, ErrorKind, Result as IoResult};
 use std::path::{Path, PathBuf};
 
-use crate::{Error, Result, system_error};
+use crate::{Error, Result};
 #[cfg(unix)]
 use unix as reserved;
 #[cfg(windows)]
 use windows as reserved;
+
+/// The code of a denied access: of Linux and its kin, and of Windows (winerror.h).
+#[cfg(unix)]
+const DENIED: i32 = libc::EACCES;
+#[cfg(windows)]
+const DENIED: i32 = 5;
 
 /// A file that is reserved for one recording.
 #[derive(Debug)]
@@ -95,7 +101,7 @@ fn open(path: &Path, overwrite: bool) -> IoResult<(File, bool)> {
 /// Refuses a write-protected file, also for the superuser, who could write to it.
 fn replaceable(path: &Path) -> Result<()> {
     match std::fs::metadata(path) {
-        Ok(file) if file.permissions().readonly() => Err(Error::file(path)(system_error::denied())),
+        Ok(file) if file.permissions().readonly() => Err(Error::file(path)(IoError::from_raw_os_error(DENIED))),
         _ => Ok(()),
     }
 }

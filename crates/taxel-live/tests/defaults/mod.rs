@@ -13,8 +13,7 @@ pub fn options(array: &Array, address: SocketAddr) -> LiveOptions {
     let all = json!({
         "host": address.ip(), "port": address.port(), "array": array, "registers": Registers::default(),
         "differences": false, "record_later": false, "name": "board", "sources": [], "compression": "none",
-        "overwrite": false, "guard_frames": null, "gap_frames": 1.0, "lines": false, "send": [],
-        "kernel_buffer_bytes": 33_554_432, "queue_bytes": 67_108_864, "readout_events": 1_048_576, "gro": true,
+        "overwrite": false, "guard_frames": null, "lines": false, "send": [],
     });
     serde_json::from_value(all).expect("every option has a value")
 }

@@ -164,7 +164,7 @@ fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
     for _ in 0..20 {
         let n = random.random_range(1..stamps.len() - 1);
         let mut player = Player::open(&index, stamps[n], &ViewOptions::plain(COLUMN_US), None).unwrap();
-        assert_eq!(index.stamp_before(player.t()).unwrap(), Some(stamps[n - 1]));
+        assert_eq!(index.stamp_before(player.t).unwrap(), Some(stamps[n - 1]));
         assert_eq!(player.next_stamp().unwrap(), Some(stamps[n + 1]));
     }
     std::fs::remove_file(&path).unwrap();

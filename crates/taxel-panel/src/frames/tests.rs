@@ -85,7 +85,7 @@ fn at_any_time_the_last_frame_of_each_source_is_shown_with_its_load() {
         for _ in 0..10 {
             let t = random.random_range(first..=last);
             let mut sought = open(t);
-            if t >= player.t() {
+            if t >= player.t {
                 player.advance(t).unwrap();
             }
             let (mut expected, mut sums) = (vec![f32::NAN; 14], [None; 2]);
@@ -104,7 +104,7 @@ fn at_any_time_the_last_frame_of_each_source_is_shown_with_its_load() {
                 let held = player.state.held().iter();
                 held.map(|&ticks| if ticks == UNKNOWN { f64::NAN } else { value(ticks) }).collect()
             };
-            for player in [&sought].into_iter().chain((player.t() == t).then_some(&player)) {
+            for player in [&sought].into_iter().chain((player.t == t).then_some(&player)) {
                 for (ours, theirs) in shown(player).iter().zip(&expected) {
                     let near = (ours - f64::from(*theirs)).abs() <= 0.51 * steps.size;
                     assert!(near || ours.is_nan() && theirs.is_nan(), "{ours} {theirs}");
@@ -133,7 +133,7 @@ fn at_any_time_the_last_frame_of_each_source_is_shown_with_its_load() {
                 let far = |ours: f32, moment: f32| (ours - moment / mass).abs() > 0.02;
                 assert!(mass < 30.0 || !(far(x, at[0]) || far(y, at[1])), "{source}: {x}, {y} of {at:?} / {mass}");
             }
-            if sought.t() == last {
+            if sought.t == last {
                 let of = |columns: &TimeColumns| columns.curves(column);
                 assert_eq!(of(index.whole.as_ref().unwrap()), of(sought.state.columns()));
             }

@@ -5,7 +5,7 @@ use std::time::Instant;
 /// The speed and the present time of a recording that is played.
 pub(super) struct Playback {
     /// Board time over real time.
-    speed: f64,
+    pub(super) speed: f64,
     /// When and at which board time (us) playing began; `None` while paused.
     begun: Option<(Instant, i64)>,
 }
@@ -13,10 +13,6 @@ pub(super) struct Playback {
 impl Playback {
     pub(super) fn paused() -> Self {
         Self { speed: 1.0, begun: None }
-    }
-
-    pub(super) fn speed(&self) -> f64 {
-        self.speed
     }
 
     pub(super) fn is_playing(&self) -> bool {
@@ -29,11 +25,6 @@ impl Playback {
 
     pub(super) fn pause(&mut self) {
         self.begun = None;
-    }
-
-    /// Continues from `t`, if it is playing.
-    pub(super) fn continue_from(&mut self, t: i64) {
-        self.begun = self.begun.map(|_| (Instant::now(), t));
     }
 
     /// Board time of now, us, while it is playing.

@@ -40,7 +40,7 @@ TouchCounts = NDArray[np.uint32]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Health:
-    """Hold which taxels are dead, stuck or noisy.
+    """Which taxels are dead, stuck or noisy.
 
     Parameters
     ----------
