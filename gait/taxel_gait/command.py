@@ -108,7 +108,8 @@ def steps(
     say(*(f"taxel: {why if name in why else f'{name}: {why}'}" for name, why in left_out.items()), err=True)
     if not rows:
         running.clear(folder)
-        say(f"taxel: {cohort.place}: no step was found, so no table is written", err=True)
+        if len(left_out) != 1:
+            say(f"taxel: {cohort.place}: no step was found, so no table is written", err=True)
         return WRONG_INPUT
     definitions = list(dict.fromkeys(words for one in measured.values() for words in one.definitions))
     about = _about(list(measured.values()), definitions, rows, left_out)

@@ -87,7 +87,8 @@ def footprint(
     rows = [row for one in measured for row in one.rows]
     if not rows:
         running.clear(folder)
-        say(f"taxel: {cohort.place}: no footprint was found, so no table is written", err=True)
+        if len(left_out) != 1:
+            say(f"taxel: {cohort.place}: no footprint was found, so no table is written", err=True)
         return WRONG_INPUT
     regions = [row for one in measured for row in one.regions]
     feet = {person.name: one["feet"] for person, one in zip(people, found, strict=True) if one is not None}

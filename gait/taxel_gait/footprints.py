@@ -21,6 +21,7 @@ from taxel_gait.feet import Foot, feet_of
 from taxel_gait.loads import balances, curves_of, loads_of, of_print, of_region
 from taxel_gait.masks import MASKS, Picture, find_mask, laid_on, mean_picture
 from taxel_gait.prints import Placed, Print, place
+from taxel_gait.running import why
 from taxel_gait.stances import Definition, find_stances
 from taxel_gait.walk import steps_of
 
@@ -168,7 +169,7 @@ def measure_person(person: Person, options: FootprintOptions, reading: Reading, 
         try:
             footfalls += _footfalls(entry, options, reading, found.about)
         except (taxel.Error, OSError) as error:
-            found.failed[entry.name] = str(error)
+            found.failed[entry.name] = why(error)
     whole = [one for one in footfalls if one.used == "yes" and one.placed is not None]
     sides = sorted({one.keys["foot"] for one in whole})
     for side in sides:

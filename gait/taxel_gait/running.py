@@ -15,7 +15,7 @@ import taxel
 from taxel.report import write_whole
 from taxel.tasks import Workers
 
-__all__ = ["run", "stamp"]
+__all__ = ["clear", "run", "stamp", "why"]
 
 #: The folder of what is known so far of a run that has not ended.
 PARTS = ".parts"
@@ -94,6 +94,12 @@ def stamp(entry: object, files: Sequence[Path], *how: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+def why(error: Exception) -> str:
+    """Return why a recording failed, in one line."""
+    first, *more = str(error).splitlines() or [type(error).__name__]
+    return first + " (taxel info FILE shows them)" * bool(more)
+
+
 def _tried(work: Callable[[_T], dict[str, Any]], entry: _T) -> tuple[dict[str, Any] | None, str]:
     """Return what the work gives with its warnings, or why it failed."""
     with warnings.catch_warnings(record=True) as said:
@@ -101,6 +107,6 @@ def _tried(work: Callable[[_T], dict[str, Any]], entry: _T) -> tuple[dict[str, A
         try:
             result = work(entry)
         except (taxel.Error, OSError, MemoryError) as error:
-            return None, str(error) or type(error).__name__
+            return None, why(error)
     result["warnings"] = [*dict.fromkeys(str(one.message) for one in said), *result.get("warnings", ())]
     return result, ""
