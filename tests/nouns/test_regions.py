@@ -167,9 +167,10 @@ def test_a_file_of_regions_comes_back(tmp_path):
 )
 def test_what_is_no_file_of_regions_is_refused_by_its_name(tmp_path, stated):
     (tmp_path / "a.regions.json").write_text(stated)
-    with pytest.raises(FormatError) as refused:
+    with pytest.raises(FormatError) as caught:
         taxel.read_regions(tmp_path / "a.regions.json")
-    assert "a.regions.json" in str(refused.value)
+    assert caught.value.place is not None
+    assert caught.value.place.file == str(tmp_path / "a.regions.json")
 
 
 @pytest.mark.parametrize(
