@@ -66,8 +66,9 @@ def footprint(
     """
     from taxel_gait.footprint_report import write_report  # noqa: PLC0415  jinja2 loads slowly
 
-    cohort = Cohort.of([path], reading.layout)
-    folder = FOLDER if out is None else out
+    reading, options = running.found_anywhere(reading), running.found_anywhere(options)
+    cohort = Cohort.of([path.absolute()], reading.layout)
+    folder = (FOLDER if out is None else out).absolute()
     folder.mkdir(parents=True, exist_ok=True)
     output.check(*(folder / name for name in (*_TABLES, _PAGE)))
     people = people_of(cohort.entries)
@@ -137,7 +138,7 @@ def footprint(
         },
         f"{len(rows)} footprints of {len(feet)} people, of which {used['yes']} are in means",
         *(f"  {count} left out: {why}" for why, count in used.items() if why != "yes"),
-        f"written to {folder}: {', '.join((*_TABLES, _PAGE))}",
+        f"written to {FOLDER if out is None else out}: {', '.join((*_TABLES, _PAGE))}",
     )
     return WRONG_INPUT if left_out else 0
 

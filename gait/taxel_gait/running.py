@@ -7,15 +7,19 @@ import json
 import shutil
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import taxel
 from taxel.report import write_whole
 from taxel.tasks import Workers
 
-__all__ = ["clear", "run", "stamp", "why"]
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+__all__ = ["clear", "found_anywhere", "run", "stamp", "why"]
 
 #: The folder of what is known so far of a run that has not ended.
 PARTS = ".parts"
@@ -30,6 +34,8 @@ class Named(Protocol):
 
 
 _T = TypeVar("_T", bound=Named)
+#: A frozen dataclass.
+_O = TypeVar("_O", bound="DataclassInstance")
 
 
 def run(
@@ -71,6 +77,12 @@ def run(
         text = json.dumps(result).encode()
         write_whole(files[k], lambda file, text=text: file.write(text), overwrite=True)  # type: ignore[misc]
     return found, {entry.name: failed[entry.name] for entry in entries if entry.name in failed}
+
+
+def found_anywhere(options: _O) -> _O:
+    """Return options with whole paths: a worker of a cluster runs in another folder."""
+    paths = {name: value.absolute() for name, value in vars(options).items() if isinstance(value, Path)}
+    return replace(options, **paths)
 
 
 def clear(folder: Path) -> None:
