@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import taxel
-from taxel.report import write_whole
 from taxel.tasks import Workers
 
 if TYPE_CHECKING:
@@ -61,6 +60,8 @@ def run(
     workers : Workers
     show : function of a step, how many are done, and how many there are
     """
+    from taxel.report import write_whole  # noqa: PLC0415  loads slowly
+
     parts = folder / PARTS
     parts.mkdir(exist_ok=True)
     files = [parts / f"{one}.json" for one in stamps]
