@@ -126,6 +126,9 @@ def footprint(
     by_person = {name: [one for one in summed if one.person == name] for name in feet}
     name, _, unit = load.partition("_")
     write_report(folder / _PAGE, about, feet, means, by_person, f"{name} ({unit})", overwrite=output.overwrite)
+    if options.boxes:
+        text = "\n".join(["recording,label,t_us", *(line for one in measured for line in one.labels), ""])
+        (folder / "boxes" / "labels.csv").write_text(text, "utf-8")
     running.clear(folder)
     used = Counter(row["used"] for row in rows)
     output.say(

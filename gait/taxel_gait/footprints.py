@@ -16,11 +16,12 @@ from taxel import ProblemError, Recording, Region
 from taxel.cli.app import Limits
 from taxel.options import Reading
 from taxel.recording.opening import sensors
+from taxel_gait.boxes import write_box
 from taxel_gait.cohort import Entry
 from taxel_gait.feet import Foot, feet_of
 from taxel_gait.loads import balances, curves_of, loads_of, of_print, of_region
 from taxel_gait.masks import MASKS, Picture, find_mask, laid_on, mean_picture
-from taxel_gait.prints import Placed, Print, place
+from taxel_gait.prints import BOX, Placed, Print, place
 from taxel_gait.running import why
 from taxel_gait.stances import Definition, find_stances
 from taxel_gait.walk import steps_of
@@ -48,6 +49,9 @@ class FootprintOptions:
     sensors
         For insoles of few sensors a file of regions that says which sensors belong together. Default: that of the
         maker, which comes with this command (gaitpdb, moticon, pedar).
+    boxes
+        Write each print to boxes/NAME.npz for taxel train, with boxes/labels.csv: turned, and its box resized to 15 x 7
+        cells, so that one readout holds many people.
     own_mask
         Find the regions of each print on itself instead of on the person's mean footprint.
     definition
@@ -66,6 +70,7 @@ class FootprintOptions:
 
     mask: str = "nine"
     sensors: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    boxes: bool = False
     own_mask: bool = False
     definition: Annotated[str | None, Parameter(metavar="KIND:A,B")] = None
     side: Annotated[str, Parameter(metavar="left|right")] = ""
@@ -117,6 +122,8 @@ class Footprints:
     warnings : list of str
     about : list of str
         What the tables say of the regions.
+    labels : list of str
+        The rows of the table of labels of boxes.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -126,6 +133,7 @@ class Footprints:
     failed: dict[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     about: list[str] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
 
 
 def people_of(entries: Sequence[Entry]) -> list[Person]:
@@ -177,6 +185,9 @@ def measure_person(person: Person, options: FootprintOptions, reading: Reading, 
         found.feet[side] = _foot(person, side, own, options, folder)
     for one in footfalls:
         _measure(found, one, options)
+        if options.boxes and one.used == "yes" and one.placed is not None:
+            name = f"{one.keys['recording']}-{one.keys['step']}"
+            found.labels.extend(write_box(folder / "boxes", name, one.one, one.placed))
     if len(sides) == 1 and not options.side and len(whole) > 1 and not any(e.side for e in person.entries):
         found.warnings.append(
             f"{person.name}: all prints are {sides[0]} feet, seen from above; say --side if that is wrong"
@@ -191,7 +202,7 @@ def _footfalls(entry: Entry, options: FootprintOptions, reading: Reading, about:
     trials = reading.open_trials(entry.paths[0])
     for trial in trials:
         name = trial.name if len(trials) > 1 else entry.name
-        if all(sensor.array.pitch_mm is None for sensor in sensors(trial)):
+        if all(sensor.array.pitch_mm is None and sensor.array.name != BOX for sensor in sensors(trial)):
             yield from _of_insoles(trial, entry, name, options, about)
             continue
         for sensor in sensors(trial):

@@ -110,6 +110,26 @@ def test_a_footprint_without_toes_has_empty_cells(tmp_path):
     assert len(prints) == 1
 
 
+def test_boxes_of_many_people_are_alike_and_are_not_measured(plate, tmp_path, capsys):
+    assert run(plate, "-o", tmp_path / "out", "--boxes") == 0
+    boxes = sorted((tmp_path / "out" / "boxes").glob("*.npz"))
+    assert len(boxes) == 8
+    opened = [taxel.open(box) for box in boxes]
+    assert {one.array.shape for one in opened} == {(15, 7)}
+    # However the foot lay, and of whichever side: heel, hallux and lateral border are on the same cells.
+    first, *others = (one.frames().maximum() for one in opened)
+    assert all(np.corrcoef(first.ravel(), other.ravel())[0, 1] > 0.85 for other in others)
+    # Sums are kept: those of the cells that belong to the print.
+    frames, _ = drawn(noise=0.01)
+    whole = taxel.open(tmp_path / "out" / "boxes" / "anna-0-1.npz").frames()
+    assert whole.total().max() == pytest.approx(frames.total().max(), rel=0.02)
+    labels = taxel.Labels(tmp_path / "out" / "boxes" / "labels.csv").times(opened[0])
+    assert [len(labels[name]) for name in ("contact", "foot_off")] == [1, 1]
+    capsys.readouterr()
+    assert run(boxes[0], "-o", tmp_path / "no") == 2
+    assert "turned and resized" in capsys.readouterr().err
+
+
 def test_steps_of_an_insole_of_a_grid_are_prints(tmp_path):
     frames, _ = drawn(10.0)
     # Nine stances of 0.51 s, 0.49 s apart.
