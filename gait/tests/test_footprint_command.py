@@ -66,6 +66,19 @@ def test_a_folder_of_prints_gives_tables_masks_and_a_page(plate, tmp_path):
     assert "right: 2 in means" in page
 
 
+def test_both_feet_of_a_walk_are_measured_with_the_feet_that_are_stated(tmp_path):
+    for name, left in (("l", True), ("r", False)):
+        taxel.convert(drawn(10.0, left=left)[0], tmp_path / f"{name}.npz")
+    table_of = "recording,person,foot,walk,condition\nl,anna,left,w,slow\nr,anna,right,w,slow\n"
+    (tmp_path / "recordings.csv").write_text(table_of)
+    assert run(tmp_path, "-o", tmp_path / "out") == 0
+    _, prints = table(tmp_path / "out" / "footprints.csv")
+    assert [(row["recording"], row["foot"], row["condition"]) for row in prints] == [
+        ("w", "left", "slow"),
+        ("w", "right", "slow"),
+    ]
+
+
 def test_wide_has_a_row_a_print(plate, tmp_path):
     run(plate, "-o", tmp_path / "out", "--wide", "--mask", "thirds")
     _, rows = table(tmp_path / "out" / "regions.csv")

@@ -190,6 +190,20 @@ def test_two_files_of_one_walk_need_a_common_clock(tmp_path, capsys):
     assert {file.name for file in (tmp_path / "out").glob("*.steps.csv")} == {"left.steps.csv", "right.steps.csv"}
 
 
+def test_both_feet_of_a_walk_in_a_cohort(tmp_path):
+    one_foot(tmp_path / "L1.npz", contacts(0.5, 18))
+    one_foot(tmp_path / "R1.npz", contacts(1.0, 18))
+    one_foot(tmp_path / "L2.npz", contacts(0.5, 18))
+    rows = ["recording,person,foot,walk", "L1,anna,left,first", "R1,anna,right,first", "L2,anna,left,"]
+    (tmp_path / "recordings.csv").write_text("\n".join(rows))
+    assert run(tmp_path, "--same-clock", "-o", tmp_path / "out") == 0
+    _, table_of = table(tmp_path / "out" / "steps.csv")
+    assert {row["step_s"] for row in table_of if row["used"] == "yes" and row["recording"] == "first"} == {"0.5"}
+    assert {(row["foot"], row["step_s"]) for row in table_of if row["recording"] == "L2"} == {("left", "")}
+    (tmp_path / "recordings.csv").write_text("\n".join([*rows[:2], "R1,bo,right,first"]))
+    assert run(tmp_path, "--same-clock", "-o", tmp_path / "no") == 2
+
+
 def test_one_foot_alone_says_why_cells_are_empty(tmp_path):
     run(one_foot(tmp_path / "left.npz", contacts(0.5, 18)), "--side", "left", "-o", tmp_path / "out")
     about, rows = table(tmp_path / "out" / "steps.csv")
