@@ -2,14 +2,15 @@
 
 ``people.csv`` has a column `person`, and may have `recording` (a pattern of names, such as ``GaCo02_*``), `weight_kg`
 and any others; without `recording`, a person's recordings begin with the person's name, or are in a folder of it.
-``recordings.csv`` has `recording` and `person`, and may have `condition` and `foot`.
+``recordings.csv`` has `recording` and `person`, and may have `condition`, `foot` (left or right) and `walk`: two rows
+of one walk are its left and its right foot.
 """
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -106,6 +107,7 @@ def _of_folder(folder: Path, layout: Path | None) -> Cohort:
     weights = {row["person"]: _weight(folder, row) for row in people}
     left_out, entries = dict[str, str](), []
     if listed:
+        walks: dict[str, list[Entry]] = {}
         for row in listed:
             files_of = _named(row["recording"], names)
             if people and row["person"] not in weights:
@@ -114,19 +116,32 @@ def _of_folder(folder: Path, layout: Path | None) -> Cohort:
                 left_out[row["recording"]] = f"{RECORDINGS} names it, and it is not in {folder}"
             for name in files_of:
                 about = row.get("condition", ""), row.get("foot", "").lower()
-                entries.append(Entry(name, (names[name],), row["person"], *about, weights.get(row["person"])))
+                entry = Entry(name, (names[name],), row["person"], *about, weights.get(row["person"]))
+                walks.setdefault(row.get("walk") or name, []).append(entry)
+        entries += [_walk(folder / RECORDINGS, walk, own) for walk, own in walks.items()]
     else:
         for row in people:
             own = [name for name in names if _is_of(name, row)]
             if not own:
                 left_out[row["person"]] = f"{PEOPLE} names this person, and no recording in {folder} is theirs"
             entries += [Entry(name, (names[name],), row["person"], weight_kg=weights[row["person"]]) for name in own]
-    taken = {entry.name for entry in entries}
+    taken = {_name(folder, path) for entry in entries for path in entry.paths}
     table = RECORDINGS if listed else PEOPLE
     left_out |= {name: f"no row of {table} is of this recording" for name in names if name not in taken}
     if not entries:
         raise FormatError(f"{folder}: no row of {table} names a recording that is there: {_some(names)}")
     return Cohort(folder, tuple(entries), left_out)
+
+
+def _walk(table: Path, name: str, rows: Sequence[Entry]) -> Entry:
+    """Return the entry of the rows of a walk: of one recording, or of those of the left and the right foot."""
+    if len(rows) == 1:
+        return rows[0]
+    by_foot = {row.side: row for row in rows}
+    if len(rows) != 2 or {*by_foot} != {"left", "right"} or len({(row.person, row.condition) for row in rows}) > 1:
+        raise FormatError(f"{table}: walk {name} must be two rows of one person and condition, foot left and right")
+    left, right = by_foot["left"], by_foot["right"]
+    return replace(left, name=name, paths=(*left.paths, *right.paths), side="")
 
 
 def _files(folder: Path, layout: Path | None) -> list[Path]:

@@ -28,8 +28,14 @@ FOLDER = Path("taxel-steps")
 _TABLES = ("steps.csv", "summary.csv", "symmetry.csv", "curves.csv")
 _PAGE = "report.html"
 #: What the columns are, in words from which they can be computed anew.
+_RULE = (
+    "a stance: from where the load rises to 30 % of its range (10th, of a single sensor 15th, to 95th percentile of 20 "
+    "s around, each second) until it falls below 20 %; a gap under 0.05 s, or never below 15 %, is no swing between "
+    "two; stances are 0.1 s or longer",
+    "contact: the sample after the swing's last one below its level; lift: the swing's first one below its level; a "
+    "swing's base: the 25th percentile of its load, of a single sensor the 75th",
+)
 _WORDS = (
-    "a swing's base: the 25th percentile of its load, of a single sensor the 75th",
     "stance_s: lift - contact; swing_s: the foot's next contact - lift; stride_s: next contact - contact; stance_pct: "
     "stance / stride; cadence: 120 / stride_s, steps a minute",
     "step_s: contact - the other foot's last contact; double_support_initial_s: the other foot's lift - contact; "
@@ -82,11 +88,12 @@ def steps(
     """
     from taxel_gait.report import write_report  # noqa: PLC0415  jinja2 loads slowly
 
-    cohort = Cohort.of(paths, reading.layout)
-    folder = FOLDER if out is None else out
+    reading, options = running.found_anywhere(reading), running.found_anywhere(options)
+    cohort = Cohort.of([path.absolute() for path in paths], reading.layout)
+    folder = (FOLDER if out is None else out).absolute()
     folder.mkdir(parents=True, exist_ok=True)
     output.check(*(folder / name for name in (*_TABLES, _PAGE)))
-    label_tables = [_label_tables(entry, out) for entry in cohort.entries]
+    label_tables = [_label_tables(entry, None if out is None else folder) for entry in cohort.entries]
     by_entry = dict(zip(cohort.entries, label_tables, strict=True))
     stamps = [running.stamp(one, [*one.paths, *of], options, reading) for one, of in by_entry.items()]
     with progress(output.json) as show:
@@ -108,10 +115,11 @@ def steps(
     say(*(f"taxel: {why if name in why else f'{name}: {why}'}" for name, why in left_out.items()), err=True)
     if not rows:
         running.clear(folder)
-        say(f"taxel: {cohort.place}: no step was found, so no table is written", err=True)
+        if len(left_out) != 1:
+            say(f"taxel: {cohort.place}: no step was found, so no table is written", err=True)
         return WRONG_INPUT
     definitions = list(dict.fromkeys(words for one in measured.values() for words in one.definitions))
-    about = _about(list(measured.values()), definitions, rows, left_out)
+    about = _about(list(measured.values()), definitions, rows, left_out, options)
     over_stance = [curve for one in measured.values() for curve in one.curves]
     written = _write(folder, about, rows, over_stance, decimal_comma=decimal_comma, overwrite=output.overwrite)
     write_report(folder / _PAGE, about, definitions, rows, over_stance, overwrite=output.overwrite)
@@ -130,7 +138,7 @@ def steps(
         f"{len(measured)} of {len(cohort.entries)} recordings, {len(rows)} steps, of which {used['yes']} are in means: "
         + ", ".join(f"{count} {name}" for name, count in used.items() if name != "yes"),
         *_lines(summary(rows)) * (people == 1),
-        f"written to {folder}: {', '.join((*_TABLES, _PAGE))}",
+        f"written to {FOLDER if out is None else out}: {', '.join((*_TABLES, _PAGE))}",
         f"labels: {by_entry[next(iter(measured))][0]}" + " ..." * (len(measured) > 1),
     )
     return WRONG_INPUT if left_out else 0
@@ -155,6 +163,7 @@ def _about(
     definitions: Sequence[str],
     rows: Sequence[dict[str, Any]],
     left_out: dict[str, str],
+    options: StepOptions,
 ) -> list[str]:
     """Return what stands above the names of each table."""
     used = Counter(row["used"] for row in rows)
@@ -162,6 +171,7 @@ def _about(
     return [
         f"taxel {taxel.__version__}, taxel steps",
         *definitions,
+        *(() if options.readout is not None else _RULE),
         *_WORDS,
         f"means are of {used['yes']} steps that are used; left out: "
         + (", ".join(f"{count} {name}" for name, count in used.items() if name != "yes") or "none"),

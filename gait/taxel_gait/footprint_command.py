@@ -66,8 +66,9 @@ def footprint(
     """
     from taxel_gait.footprint_report import write_report  # noqa: PLC0415  jinja2 loads slowly
 
-    cohort = Cohort.of([path], reading.layout)
-    folder = FOLDER if out is None else out
+    reading, options = running.found_anywhere(reading), running.found_anywhere(options)
+    cohort = Cohort.of([path.absolute()], reading.layout)
+    folder = (FOLDER if out is None else out).absolute()
     folder.mkdir(parents=True, exist_ok=True)
     output.check(*(folder / name for name in (*_TABLES, _PAGE)))
     people = people_of(cohort.entries)
@@ -87,7 +88,8 @@ def footprint(
     rows = [row for one in measured for row in one.rows]
     if not rows:
         running.clear(folder)
-        say(f"taxel: {cohort.place}: no footprint was found, so no table is written", err=True)
+        if len(left_out) != 1:
+            say(f"taxel: {cohort.place}: no footprint was found, so no table is written", err=True)
         return WRONG_INPUT
     regions = [row for one in measured for row in one.regions]
     feet = {person.name: one["feet"] for person, one in zip(people, found, strict=True) if one is not None}
@@ -124,6 +126,9 @@ def footprint(
     by_person = {name: [one for one in summed if one.person == name] for name in feet}
     name, _, unit = load.partition("_")
     write_report(folder / _PAGE, about, feet, means, by_person, f"{name} ({unit})", overwrite=output.overwrite)
+    if options.boxes:
+        text = "\n".join(["recording,label,t_us", *(line for one in measured for line in one.labels), ""])
+        (folder / "boxes" / "labels.csv").write_text(text, "utf-8")
     running.clear(folder)
     used = Counter(row["used"] for row in rows)
     output.say(
@@ -136,7 +141,7 @@ def footprint(
         },
         f"{len(rows)} footprints of {len(feet)} people, of which {used['yes']} are in means",
         *(f"  {count} left out: {why}" for why, count in used.items() if why != "yes"),
-        f"written to {folder}: {', '.join((*_TABLES, _PAGE))}",
+        f"written to {FOLDER if out is None else out}: {', '.join((*_TABLES, _PAGE))}",
     )
     return WRONG_INPUT if left_out else 0
 

@@ -16,11 +16,13 @@ from taxel import ProblemError, Recording, Region
 from taxel.cli.app import Limits
 from taxel.options import Reading
 from taxel.recording.opening import sensors
+from taxel_gait.boxes import write_box
 from taxel_gait.cohort import Entry
-from taxel_gait.feet import Foot, feet_of
+from taxel_gait.feet import SIDES, Foot, feet_of
 from taxel_gait.loads import balances, curves_of, loads_of, of_print, of_region
 from taxel_gait.masks import MASKS, Picture, find_mask, laid_on, mean_picture
-from taxel_gait.prints import Placed, Print, place
+from taxel_gait.prints import BOX, Placed, Print, place
+from taxel_gait.running import why
 from taxel_gait.stances import Definition, find_stances
 from taxel_gait.walk import steps_of
 
@@ -47,6 +49,9 @@ class FootprintOptions:
     sensors
         For insoles of few sensors a file of regions that says which sensors belong together. Default: that of the
         maker, which comes with this command (gaitpdb, moticon, pedar).
+    boxes
+        Write each print to boxes/NAME.npz for taxel train, with boxes/labels.csv: turned, and its box resized to 15 x 7
+        cells, so that one readout holds many people.
     own_mask
         Find the regions of each print on itself instead of on the person's mean footprint.
     definition
@@ -65,6 +70,7 @@ class FootprintOptions:
 
     mask: str = "nine"
     sensors: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    boxes: bool = False
     own_mask: bool = False
     definition: Annotated[str | None, Parameter(metavar="KIND:A,B")] = None
     side: Annotated[str, Parameter(metavar="left|right")] = ""
@@ -116,6 +122,8 @@ class Footprints:
     warnings : list of str
     about : list of str
         What the tables say of the regions.
+    labels : list of str
+        The rows of the table of labels of boxes.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -125,6 +133,7 @@ class Footprints:
     failed: dict[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     about: list[str] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
 
 
 def people_of(entries: Sequence[Entry]) -> list[Person]:
@@ -168,7 +177,7 @@ def measure_person(person: Person, options: FootprintOptions, reading: Reading, 
         try:
             footfalls += _footfalls(entry, options, reading, found.about)
         except (taxel.Error, OSError) as error:
-            found.failed[entry.name] = str(error)
+            found.failed[entry.name] = why(error)
     whole = [one for one in footfalls if one.used == "yes" and one.placed is not None]
     sides = sorted({one.keys["foot"] for one in whole})
     for side in sides:
@@ -176,6 +185,9 @@ def measure_person(person: Person, options: FootprintOptions, reading: Reading, 
         found.feet[side] = _foot(person, side, own, options, folder)
     for one in footfalls:
         _measure(found, one, options)
+        if options.boxes and one.used == "yes" and one.placed is not None:
+            name = f"{one.keys['recording']}-{one.keys['step']}"
+            found.labels.extend(write_box(folder / "boxes", name, one.one, one.placed))
     if len(sides) == 1 and not options.side and len(whole) > 1 and not any(e.side for e in person.entries):
         found.warnings.append(
             f"{person.name}: all prints are {sides[0]} feet, seen from above; say --side if that is wrong"
@@ -185,25 +197,25 @@ def measure_person(person: Person, options: FootprintOptions, reading: Reading, 
 
 def _footfalls(entry: Entry, options: FootprintOptions, reading: Reading, about: list[str]) -> Iterator[_Footfall]:
     """Yield the footfalls of a recording; `about` gets what is to be said of regions that a file states."""
-    if len(entry.paths) > 1:
-        raise ProblemError("footprints are measured a recording at a time")
-    trials = reading.open_trials(entry.paths[0])
-    for trial in trials:
-        name = trial.name if len(trials) > 1 else entry.name
-        if all(sensor.array.pitch_mm is None for sensor in sensors(trial)):
-            yield from _of_insoles(trial, entry, name, options, about)
-            continue
-        for sensor in sensors(trial):
-            for number, used, one in _prints(sensor, options):
-                keys = {"recording": name, "person": entry.person, "condition": entry.condition, "step": number}
-                placed = place(one, options.side or entry.side or sensor.side)
-                doubts = "; ".join(placed.doubts)
-                yield _Footfall(keys | {"foot": placed.side}, one, placed, doubts or used, entry.weight_kg)
+    sides = SIDES if len(entry.paths) > 1 else (entry.side,)
+    for path, own in zip(entry.paths, sides, strict=True):
+        trials, side = reading.open_trials(path), options.side or own
+        for trial in trials:
+            name = trial.name if len(trials) > 1 else entry.name
+            keys = {"recording": name, "person": entry.person, "condition": entry.condition}
+            if all(sensor.array.pitch_mm is None and sensor.array.name != BOX for sensor in sensors(trial)):
+                for footfall in _of_insoles(trial, side, options, about):
+                    yield footfall._replace(keys=keys | footfall.keys, weight_kg=entry.weight_kg)
+                continue
+            for sensor in sensors(trial):
+                for number, used, one in _prints(sensor, options):
+                    placed = place(one, side or sensor.side)
+                    doubts = "; ".join(placed.doubts)
+                    foot = {"step": number, "foot": placed.side}
+                    yield _Footfall(keys | foot, one, placed, doubts or used, entry.weight_kg)
 
 
-def _of_insoles(
-    trial: Recording, entry: Entry, name: str, options: FootprintOptions, about: list[str]
-) -> Iterator[_Footfall]:
+def _of_insoles(trial: Recording, side: str, options: FootprintOptions, about: list[str]) -> Iterator[_Footfall]:
     """Yield the steps of insoles of few sensors, whose regions a file states.
 
     Raises
@@ -220,16 +232,15 @@ def _of_insoles(
     regions = taxel.read_regions(file)
     stated = f"sensors of regions: {file.name}: {json.loads(file.read_text('utf-8')).get('about', '')}".rstrip(": ")
     about += [line for line in (stated, _NO_GRID) if line not in about]
-    feet = feet_of([trial], options.side or entry.side)
+    feet = feet_of([trial], side)
     stances = [
         find_stances(foot.t, foot.force, options.definition_of(foot), is_channel=foot.is_channel) for foot in feet
     ]
     for step in steps_of(feet, stances, [np.zeros(len(one.contact), bool) for one in stances]):
         foot = feet[step.foot]
-        keys = {"recording": name, "person": entry.person, "condition": entry.condition, "step": step.number}
         if step.used != "cut":
             one = Print(foot.frames[step.first : step.end], options.above or 0.0)
-            yield _Footfall(keys | {"foot": foot.side}, one, None, step.used, entry.weight_kg, regions)
+            yield _Footfall({"step": step.number, "foot": foot.side}, one, None, step.used, None, regions)
 
 
 def _prints(recording: Recording, options: FootprintOptions) -> Iterator[tuple[int, str, Print]]:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from taxel import Note
 from taxel.labels import rows_of, text_with
-from taxel.report import write_whole
 from taxel_gait.feet import Foot
 from taxel_gait.stances import Stances
 from taxel_gait.walk import Step
@@ -60,6 +59,8 @@ def keep(feet: Sequence[Foot], steps: Sequence[Step], found: Sequence[Stances], 
 
 def write(path: Path, rows: Iterable[Note]) -> None:
     """Write a table of labels in the place of the one before."""
+    from taxel.report import write_whole  # noqa: PLC0415  loads slowly
+
     text = text_with(rows, ("t_us", "label", "source", *_COLUMNS))
     write_whole(path, lambda file: file.write(text.encode()), overwrite=True)
 

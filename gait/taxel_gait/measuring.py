@@ -156,9 +156,13 @@ def measure(entry: Entry, options: StepOptions, reading: Reading, tables: Sequen
         raise ProblemError(f"{entry.name}: a file of several trials is given alone")
     # Of one file each trial is a walk; of two files both together are one.
     together: list[list[Recording]] = [[one[0] for one in walks]] if len(walks) > 1 else [[one] for one in walks[0]]
+    doubts: dict[str, list[str]] = {}
     for recordings in together:
         trial = recordings[0].name if len(together) > 1 else ""
-        _measure(found, recordings, entry, trial, options, before)
+        for doubt in _measure(found, recordings, entry, trial, options, before):
+            doubts.setdefault(doubt, []).append(trial or entry.name)
+    for doubt, names in doubts.items():
+        found.warnings.append(names[0] + f" and {len(names) - 1} more" * (len(names) > 1) + f": {doubt}")
     return found
 
 
@@ -169,8 +173,8 @@ def _measure(
     trial: str,
     options: StepOptions,
     before: Sequence[Sequence[taxel.Note]],
-) -> None:
-    """Add what is measured of one walk."""
+) -> Iterator[str]:
+    """Add what is measured of one walk; yield what is doubtful about it."""
     feet = feet_of(recordings, entry.side or options.side, same_clock=options.same_clock)
     rough, stances, by_hand = [], [], []
     # Of two files each has its own table.
@@ -191,7 +195,7 @@ def _measure(
         found.rows.append(keys | row)
         found.curves.append(curve)
     found.reasons.update(_reasons(feet, options))
-    found.warnings.extend(f"{keys['recording']}: {text}" for text in _doubts(feet, steps))
+    yield from _doubts(feet, steps)
 
 
 def _stances(
@@ -268,4 +272,4 @@ def _doubts(feet: Sequence[Foot], steps: Sequence[Step]) -> Iterator[str]:
         if not own:
             yield f"{name}: no step was found"
         elif all(step.used == "cut" for step in own):
-            yield f"{name}: begins or ends loaded, so no step is whole; a plate's footfalls are no steps of an insole"
+            yield f"{name}: begins or ends loaded, so no step is whole (taxel footprint measures plates)"

@@ -19,6 +19,8 @@ from taxel_gait.feet import load_of
 
 __all__ = ["Placed", "Print", "place"]
 
+#: The name of arrays of footfalls that were turned and resized, for a training.
+BOX = "turned box"
 Floats = NDArray[np.float64]
 
 #: A cell belongs to a print above this share of the print's largest value, in a group of at least so many.
@@ -65,6 +67,10 @@ class Print:
         ------
         ProblemError : no pitch; nothing loaded
         """
+        if frames.array.name == BOX:
+            raise ProblemError(
+                "its cells are those of a foot that was turned and resized, whose values are no pressures"
+            )
         if frames.array.pitch_mm is None:
             raise ProblemError(
                 f"{frames.array!r}: the pitch is not known, so a footprint has no mm: give a layout file"

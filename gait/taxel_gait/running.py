@@ -7,15 +7,18 @@ import json
 import shutil
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import taxel
-from taxel.report import write_whole
 from taxel.tasks import Workers
 
-__all__ = ["run", "stamp"]
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+__all__ = ["clear", "found_anywhere", "run", "stamp", "why"]
 
 #: The folder of what is known so far of a run that has not ended.
 PARTS = ".parts"
@@ -30,6 +33,8 @@ class Named(Protocol):
 
 
 _T = TypeVar("_T", bound=Named)
+#: A frozen dataclass.
+_O = TypeVar("_O", bound="DataclassInstance")
 
 
 def run(
@@ -55,6 +60,8 @@ def run(
     workers : Workers
     show : function of a step, how many are done, and how many there are
     """
+    from taxel.report import write_whole  # noqa: PLC0415  loads slowly
+
     parts = folder / PARTS
     parts.mkdir(exist_ok=True)
     files = [parts / f"{one}.json" for one in stamps]
@@ -71,6 +78,12 @@ def run(
         text = json.dumps(result).encode()
         write_whole(files[k], lambda file, text=text: file.write(text), overwrite=True)  # type: ignore[misc]
     return found, {entry.name: failed[entry.name] for entry in entries if entry.name in failed}
+
+
+def found_anywhere(options: _O) -> _O:
+    """Return options with whole paths: a worker of a cluster runs in another folder."""
+    paths = {name: value.absolute() for name, value in vars(options).items() if isinstance(value, Path)}
+    return replace(options, **paths)
 
 
 def clear(folder: Path) -> None:
@@ -94,6 +107,12 @@ def stamp(entry: object, files: Sequence[Path], *how: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+def why(error: Exception) -> str:
+    """Return why a recording failed, in one line."""
+    first, *more = str(error).splitlines() or [type(error).__name__]
+    return first + " (taxel info FILE shows them)" * bool(more)
+
+
 def _tried(work: Callable[[_T], dict[str, Any]], entry: _T) -> tuple[dict[str, Any] | None, str]:
     """Return what the work gives with its warnings, or why it failed."""
     with warnings.catch_warnings(record=True) as said:
@@ -101,6 +120,6 @@ def _tried(work: Callable[[_T], dict[str, Any]], entry: _T) -> tuple[dict[str, A
         try:
             result = work(entry)
         except (taxel.Error, OSError, MemoryError) as error:
-            return None, str(error) or type(error).__name__
+            return None, why(error)
     result["warnings"] = [*dict.fromkeys(str(one.message) for one in said), *result.get("warnings", ())]
     return result, ""

@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.report import write_whole
-
 __all__ = [
     "KEYS",
     "SUMMED",
@@ -65,6 +63,8 @@ class Table(NamedTuple):
 
     def write(self, path: Path, *, decimal_comma: bool, overwrite: bool) -> None:
         """Write it with commas between cells, or with decimal commas and semicolons."""
+        from taxel.report import write_whole  # noqa: PLC0415  loads slowly
+
         text = io.StringIO(newline="")
         text.writelines(f"# {' '.join(line.split())}\n" for line in self.about)
         table = csv.writer(text, lineterminator="\n", delimiter=";" if decimal_comma else ",")

@@ -56,6 +56,19 @@ def test_the_regions_of_a_mask_add_up_to_the_whole(mask):
     assert {*found} <= {*MASKS[mask]}
 
 
+@pytest.mark.parametrize("left", [False, True])
+def test_heel_and_midfoot_carry_what_the_rule_of_pressure_gives(left):
+    # After automask_novel of pressuRe: from the toes, 73 and 45 % of the print's length along its upright axis.
+    frames, _ = drawn(left=left)
+    found = shares(frames)
+    total = frames.values.sum(axis=0, dtype=np.float64)
+    rows = np.flatnonzero(total.sum(axis=1))
+    from_toes = (np.arange(total.shape[0]) - rows[0] + 0.5) / (rows[-1] - rows[0] + 1)
+    by_row = total.sum(axis=1) / total.sum()
+    assert found["heel"] == pytest.approx(by_row[from_toes > 0.73].sum(), abs=0.03)
+    assert found["midfoot"] == pytest.approx(by_row[(from_toes > 0.45) & (from_toes <= 0.73)].sum(), abs=0.04)
+
+
 def test_masks_have_as_many_regions_as_their_names_say():
     assert {name: len(regions) for name, regions in MASKS.items()} == {
         "nine": 9,

@@ -167,9 +167,10 @@ def test_a_file_of_regions_comes_back(tmp_path):
 )
 def test_what_is_no_file_of_regions_is_refused_by_its_name(tmp_path, stated):
     (tmp_path / "a.regions.json").write_text(stated)
-    with pytest.raises(FormatError) as refused:
+    with pytest.raises(FormatError) as caught:
         taxel.read_regions(tmp_path / "a.regions.json")
-    assert "a.regions.json" in str(refused.value)
+    assert caught.value.place is not None
+    assert caught.value.place.file == str(tmp_path / "a.regions.json")
 
 
 @pytest.mark.parametrize(
@@ -193,7 +194,7 @@ def test_info_writes_the_load_of_each_region(tmp_path, capsys):
     values[1] = 50
     taxel.convert(Frames(values, [0, 1000, 2000], unit="kPa", array=GRID), tmp_path / "step.npz")
     taxel.write_regions(tmp_path / "step.regions.json", [Region.rectangle("left, half", -3.5, -2.5, 28, 57.5)])
-    arguments = [str(tmp_path / "step.npz"), "--regions", str(tmp_path / "step.regions.json")]
+    arguments = [str(tmp_path / "step.npz"), "--regions", str(tmp_path / "step.regions.json"), "--range-end", "50"]
     with pytest.raises(SystemExit):
         main(["info", *arguments, "--table", str(tmp_path / "step.csv"), "--json"])
     rows = list(csv.DictReader((tmp_path / "step.csv").read_text().splitlines()))
@@ -201,3 +202,5 @@ def test_info_writes_the_load_of_each_region(tmp_path, capsys):
     assert float(rows[1]["whole force_N"]) == pytest.approx(50 * 63 * 60 / 1000)
     facts = json.loads(capsys.readouterr().out)["pressure"]["regions"]
     assert facts["left, half"]["peak_kPa"] == 50
+    # Four of nine columns have their middle in it, and the fifth on its border.
+    assert facts["left, half"]["at_range_end_taxels"] == 4 * 12

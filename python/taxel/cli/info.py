@@ -49,6 +49,7 @@ def info(
     table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     tare: Annotated[str | None, Parameter(metavar="SECONDS|FILE")] = None,
     regions: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    range_end: float | None = None,
     each: bool = False,
     workers: Flat[Workers] = Workers(),
     reading: Flat[FullReading] = FullReading(),
@@ -76,6 +77,8 @@ def info(
         rest at the beginning. Default: measured in a quiet part of the recording.
     regions
         Measure the load of each region of this .json, such as NAME.regions.json (docs/files.md).
+    range_end
+        With --regions: the value at which the range of a taxel ends; taxels that reach it are counted.
     each
         Print all facts about each recording of a folder.
     """
@@ -110,7 +113,7 @@ def info(
                 say(f"labels of these trials need a column recording with the trial's name, for example {example}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return _code(of_each)
-        found = taxel.tasks.info(recording, tare, parts)
+        found = taxel.tasks.info(recording, tare, parts, range_end)
         facts, pressed = found.facts, found.pressed
         facts["array_assumed"] &= not reading.array
     say_warnings(found.warnings)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import instance, several
+from taxel._base.arguments import finite, instance, optional, several
 from taxel._base.messages import collected, counted
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
@@ -48,7 +48,12 @@ class Info:
         return self.facts | {"warnings": list(self.warnings)}
 
 
-def info(recording: Recording, tare: GivenTare | None = None, regions: Sequence[Region] = ()) -> Info:
+def info(
+    recording: Recording,
+    tare: GivenTare | None = None,
+    regions: Sequence[Region] = (),
+    range_end: float | None = None,
+) -> Info:
     """Summarise a recording, or each of its sources.
 
     ``taxel info`` calls this function.
@@ -61,6 +66,8 @@ def info(recording: Recording, tare: GivenTare | None = None, regions: Sequence[
         Default: that of a quiet stretch.
     regions : sequence of Region
         Those whose load is measured too, of a recording of one sensor.
+    range_end : float, in the recording's unit, optional
+        The value at which the range of a taxel ends: how many of each region reach it is counted.
 
     Raises
     ------
@@ -83,7 +90,7 @@ def info(recording: Recording, tare: GivenTare | None = None, regions: Sequence[
             found = Info(_sources(recording, tare), None)
         else:
             given = None if tare is None else rest(recording, tare)
-            pressed = series(recording, given, parts)
+            pressed = series(recording, given, parts, optional(finite, "range_end", range_end))
             found = Info(summary(recording, pressed), pressed)
     return replace(found, warnings=tuple(warnings))
 

@@ -55,8 +55,10 @@ class Series:
     regions: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
 
     @classmethod
-    def from_frames(cls, frames: Frames, above: float, rest: Rest, regions: Sequence[Region] = ()) -> Series:
-        """Return the series of frames above rest."""
+    def from_frames(
+        cls, frames: Frames, above: float, rest: Rest, regions: Sequence[Region] = (), range_end: float | None = None
+    ) -> Series:
+        """Return the series of frames above rest, and of the load of regions (`Frames.region`)."""
         array = frames.array
         block = max(1, _BLOCK // max(1, array.rows * array.columns))
         # A block at a time, because the centre's weights have 64 bits.
@@ -82,7 +84,7 @@ class Series:
             columns["force_N"] = force
         loads = {}
         for region in [_whole(array), *regions] if regions else []:
-            of_blocks = [block.region(region, above=above) for block in blocks]
+            of_blocks = [block.region(region, above=above, range_end=range_end) for block in blocks]
             loads[region.name] = {name: np.concatenate([one[name] for one in of_blocks]) for name in of_blocks[0]}
         return cls(frames.t, frames.unit, above, columns, rest, loads)
 
@@ -92,10 +94,15 @@ def _whole(array: Array) -> Region:
     return Region("whole", taxels=tuple((int(x), int(y)) for y, x in np.argwhere(array._there())))
 
 
-def series(recording: Recording, taken: Rest | None = None, regions: Sequence[Region] = ()) -> Series | None:
+def series(
+    recording: Recording,
+    taken: Rest | None = None,
+    regions: Sequence[Region] = (),
+    range_end: float | None = None,
+) -> Series | None:
     """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities."""
     result = above_rest(recording, taken)
-    return None if result is None else Series.from_frames(*result, regions)
+    return None if result is None else Series.from_frames(*result, regions, range_end)
 
 
 def _frames(recording: Recording) -> Frames:
