@@ -30,7 +30,6 @@ fn readout() -> Readout {
         neurons: [("contact".to_owned(), cell(0.2, 3.0)), ("lift".to_owned(), cell(0.5, -0.1))].into(),
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
-        seen: Default::default(),
         rest: None,
         training: None,
     }
