@@ -95,6 +95,12 @@ impl Grid {
         self.locate(t).rest.abs() <= rounding_ms(t)
     }
 
+    /// The first point at or after a time, within rounding.
+    pub fn first_from(&self, t: f64) -> f64 {
+        let nearest = self.locate(t).point;
+        if self.has_come(t, nearest) { nearest } else { nearest + 1.0 }
+    }
+
     /// The time from `from` to `to`, ms.
     pub fn between(&self, from: GridTime, to: GridTime) -> f64 {
         (to.point - from.point) * self.step_ms + (to.rest - from.rest)
