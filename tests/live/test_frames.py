@@ -20,6 +20,7 @@ import taxel
 from live.boards import LOOPBACK
 from taxel import Array, Frames, Tare
 from taxel.detect import PlainRule, Readout, run
+from taxel.detect.readout import run_watched
 from taxel.detections import Detection
 from taxel.encode import LevelCrossing
 from taxel.live import Live
@@ -260,3 +261,24 @@ def test_stamps_in_another_unit_than_is_stated_are_told(unit: str, steps_ms: flo
         finally:
             over.set()
             thread.join(10)
+
+
+@pytest.mark.parametrize("absorb_s", [60.0, 0.0])
+def test_a_rest_that_leaves_its_floor_is_counted_live_as_in_the_recording(tmp_path: Path, absorb_s: float) -> None:
+    values = 100.0 + np.random.default_rng(1).normal(0.0, 0.4, (1500, 4, 4)) + np.arange(1500)[:, None, None] / 100.0
+    values[700:800, 1:3, 1:3] += 60.0
+    t = np.arange(1500) * PERIOD_US
+    tare = Tare.take(Frames(values[:50], t[:50], unit="counts", array=Array(4, 4)))
+    rule = PlainRule("load", 50.0, 0.5, noise_floor=4.0, unit="counts", tare=tare)
+    found: list[Detection] = []
+    with served(lines_of(values, t)) as address:
+        source = f"mat=lines+tcp:{address},array=4x4,time=1:us,unit=counts"
+        options = {"readout": rule, "sources": source, "record": tmp_path / "mat.mcap", "say": found.append}
+        with Live(**options, absorb_s=absorb_s) as live:
+            until(lambda: live.counters["frames"] == len(values))
+            counters = live.stop().counters
+    found_again, left = run_watched(rule.absorbing(absorb_s), taxel.open(tmp_path / "mat.mcap"))
+    assert left is not None
+    assert counters["left_floor"] == {"since_us": left[0], "taxels": left[1]}
+    assert [(d.label, d.t) for d in found] == [(d.label, d.t) for d in found_again]
+    assert (len(found) == 2) == (absorb_s > 0.0)

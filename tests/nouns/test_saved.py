@@ -19,7 +19,7 @@ KINDS: list[tuple[Any, str, str, str]] = [
     (Tare, "tare.json", "20.5", "20.25"),
     (Calibration, "table.calibration.json", '"floor": 0.0', '"floor": 0.5'),
     (Readout, "touch.json", '"tau": 2.0', '"tau": 2.5'),
-    (PlainRule, "rule.json", '"threshold": 30.0', '"threshold": 31.0'),
+    (PlainRule, "rule.json", '"level": 30.0', '"level": 31.0'),
 ]
 
 

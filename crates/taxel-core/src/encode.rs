@@ -122,11 +122,6 @@ encoders! {
 }
 
 impl Encoder {
-    /// The noise floor above its tare, in the sensor's unit, of a composite the largest; 0 of an encoder without one.
-    pub(crate) fn floor_above_tare(&self) -> f64 {
-        self.encoding().floor_above_tare()
-    }
-
     /// Parses an encoder from JSON and checks every parameter; missing parameters have their defaults.
     ///
     /// # Errors
@@ -330,10 +325,6 @@ impl Encoding for Composite {
 
     fn latency_ms(&self) -> f64 {
         self.parts.values().map(Encoder::latency_ms).fold(0.0, f64::max)
-    }
-
-    fn floor_above_tare(&self) -> f64 {
-        self.parts.values().map(Encoder::floor_above_tare).fold(0.0, f64::max)
     }
 
     fn set_tare(&mut self, tare: &Tare) {

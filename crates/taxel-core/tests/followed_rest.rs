@@ -66,7 +66,7 @@ fn a_press_of_half_a_minute_stays_whole() {
 
 #[test]
 fn an_object_of_ten_minutes_is_rest_after_one_and_gone_within_half_a_second() {
-    let on = |s: f64| s < 600.0 || s >= 605.0;
+    let on = |s: f64| !(600.0..605.0).contains(&s);
     let mut rest = rest(FOLLOWS);
     let read = followed(&mut rest, 0.0, 620.0, |s| if on(s) { 50.0 } else { 0.0 });
     assert!(read[..6000].iter().all(|&value| value == 50.0));

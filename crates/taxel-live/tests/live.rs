@@ -108,7 +108,6 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
         neurons: [("touch".to_owned(), cell)].into(),
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
-        seen: Default::default(),
         rest: None,
         training: None,
     }

@@ -157,7 +157,6 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         neurons: [("touch".to_owned(), cell)].into(),
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
-        seen: Default::default(),
         rest: None,
         training: None,
     };

@@ -191,16 +191,6 @@ class Loads:
             self._changes[key] = [curve.changes() for curve in self._curves_of(*key)]
         return self._changes[key][k]
 
-    def largest(self, quantity: str, begins: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the largest value of a quantity between pairs of times on the one clock, each in one example."""
-        values, example = np.zeros(len(begins)), np.rint(begins / APART_US).astype(np.int64)
-        for k in np.unique(example).tolist():
-            here = example == k
-            values[here] = largest(
-                *self.changes(quantity, k), *(edge[here] - self._shift[k] for edge in (begins, ends))
-            )
-        return values
-
     def values(self, quantity: str, parts: Iterable[Stretch], levels: tuple[float, ...] = ()) -> NDArray[np.float64]:
         """Return what a quantity is after each of its changes in parts of the examples."""
         inside = [np.empty(0)]
@@ -257,17 +247,6 @@ def touches(examples: Sequence[Example], noise_floor: float) -> tuple[Loads, Fou
         return None
     loads = Loads(examples, [clock_of(example) for example in examples], noise_floor, reporting(None))
     return loads, *loads.edges(loads.of_touches)
-
-
-def largest(
-    t: NDArray[np.int64], values: NDArray[np.float64], begin: NDArray[np.int64], end: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return the largest value, of those that hold from each of some times on, in each touch."""
-    if not len(t):
-        return np.zeros(len(begin))
-    first = np.maximum(np.searchsorted(t, begin, side="right") - 1, 0)
-    stop = np.maximum(np.searchsorted(t, end), first + 1)
-    return np.array([values[i:k].max() for i, k in zip(first.tolist(), stop.tolist(), strict=True)])
 
 
 def lacks(examples: Sequence[Example]) -> str:

@@ -152,9 +152,9 @@ def tune(
     >>> example = Example(frames, {"touch": [20_000], "removal": [50_000]}, Tare.take(frames, stop_us=20_000))
     >>> rules = tune([example], window_ms=5.0)
     >>> rules["touch"]
-    PlainRule(touch: load (ticks) >= 9, release 1)
+    PlainRule(touch: load (counts) >= 4.22, release 0.25)
     >>> rules["removal"]
-    PlainRule(removal: load (ticks) falls below 9 after 9 or more)
+    PlainRule(removal: load (counts) falls below 1.05 after 4.22 or more)
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
     sound = check_examples(examples)

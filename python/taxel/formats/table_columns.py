@@ -597,7 +597,8 @@ def said_of(draft: Draft, time: int | None) -> Iterator[str]:
         if time is not None:
             yield f"time {table.time_column!r} in {table.time_unit}"
         else:
-            yield "no times" if table.frame_time is None else f"time in {table.frame_time} above each frame"
+            without = "no times" if draft.layout.source is None else "a frame's time is when it arrived"
+            yield without if table.frame_time is None else f"time in {table.frame_time} above each frame"
         if table.label_column is not None:
             yield f"labels {table.label_column!r}"
         used = [role.unit for role in draft.roles if role.role == "taxel"]

@@ -171,7 +171,7 @@ class LineShape:
         ------
         ProblemError : lines do not fill the stated array
         """
-        guess, said = "", list(form.said)
+        guess = ""
         if self._is_row:
             self.array, self.names = row_of(form, self._stated.called)
         else:
@@ -179,12 +179,11 @@ class LineShape:
                 self.array, self.names, guess = array_of(form, self.array, self._readout, self._stated.called)
             except ProblemError as error:
                 raise self._refused(f": {first_line(error)}") from None
-        said = [guess, *said] if guess else said
-        if not form.clocks:
-            said.append("a frame's time is when it arrived")
         if guess or not form.clocks:
             rows, columns = self.array.shape
-            self.read_as = f"{self._place}: read as {rows} x {columns} taxels: {'; '.join(said)}"
+            self.read_as = (
+                f"{self._place}: read as {rows} x {columns} taxels: {'; '.join(filter(None, (guess, *form.said)))}"
+            )
         if not self._is_told:
             self._stamp_us = form.clocks[0][1] if len(form.clocks) == 1 else 1.0
         return LineFrames(form, self.array.taxels, stamp_us=self._stamp_us)

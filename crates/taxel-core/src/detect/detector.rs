@@ -76,16 +76,6 @@ impl Detector {
         }
     }
 
-    /// The largest noise floor above the tare of what it reads, in the sensor's unit; 0 without one. The local load
-    /// tracks the rest, and a count by running range has none.
-    #[must_use]
-    pub fn noise_floor(&self) -> f64 {
-        match self {
-            Self::Readout(readout) => readout.noise_floor(),
-            Self::PlainRule(rule) => rule.floor_above_tare(),
-        }
-    }
-
     /// Checks that values in this unit are those that it was trained on.
     ///
     /// # Errors

@@ -39,16 +39,8 @@ impl From<f64> for FrameTime {
 pub struct FrameClock {
     period_ns: i128,
     stamp_ns: i128,
-    /// The last frame of an input of frames; with events the board's frames start at time 0.
-    last: Option<InputFrame>,
-}
-
-/// A frame of the input.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct InputFrame {
-    start_ns: i128,
-    /// The number of frames before it.
-    number: i64,
+    /// When the last frame of an input of frames began, ns; with events the board's frames start at time 0.
+    last: Option<i128>,
 }
 
 impl FrameClock {
@@ -68,8 +60,7 @@ impl FrameClock {
 
     /// Starts a frame of the input at `t` us, with which frames are aligned from now on.
     pub fn start_frame(&mut self, t: i64) {
-        let number = self.last.map_or(0, |last| last.number + 1);
-        self.last = Some(InputFrame { start_ns: i128::from(t) * 1000, number });
+        self.last = Some(i128::from(t) * 1000);
     }
 
     /// The end of the frame to which the time `t` ms belongs, us, rounded up.
@@ -78,9 +69,7 @@ impl FrameClock {
         // In whole ns, because rounding must not move a time that equals a stamp into the frame before.
         let t = (t * 1e6).round() as i128;
         let end = match self.last {
-            Some(InputFrame { start_ns, .. }) => {
-                start_ns + ((t - start_ns).div_euclid(self.period_ns) + 1) * self.period_ns
-            }
+            Some(start_ns) => start_ns + ((t - start_ns).div_euclid(self.period_ns) + 1) * self.period_ns,
             None => (self.board_frame(t) + 1) * self.period_ns,
         };
         whole_us(end)
@@ -100,34 +89,11 @@ impl FrameClock {
         times.iter().map(end).collect()
     }
 
-    /// The number of the frame to which the time `t` us belongs; of an input of frames, that of its last frame.
-    #[must_use]
-    pub fn number_of(&self, t: i64) -> i64 {
-        self.last.map_or_else(|| self.board_frame(i128::from(t) * 1000) as i64, |last| last.number)
-    }
-
-    /// The number of the first frame that may still change if no input before `t` us follows.
-    #[must_use]
-    pub fn open_at(&self, t: i64) -> i64 {
-        match self.last {
-            Some(last) => last.number + i64::from(i128::from(t) * 1000 > last.start_ns),
-            None => self.number_of(t),
-        }
-    }
-
     /// Whether the frame that holds at `at` us is complete if no input before `t` us follows.
     #[must_use]
     pub fn is_over(&self, at: i64, t: i64) -> bool {
-        if self.last.is_some() { at < t } else { self.number_of(at) < self.number_of(t) }
-    }
-
-    /// The end of the frame with this number, us, rounded up; of an input of frames, that of the last one.
-    #[must_use]
-    pub fn end_of_number(&self, number: i64) -> i64 {
-        whole_us(match self.last {
-            Some(last) => last.start_ns + self.period_ns,
-            None => (i128::from(number) + 1) * self.period_ns,
-        })
+        let [frame, now] = [at, t].map(|t| self.board_frame(i128::from(t) * 1000));
+        if self.last.is_some() { at < t } else { frame < now }
     }
 
     /// The number of the last of the board's frames that starts before the stamp after `t` ns.

@@ -205,11 +205,6 @@ impl PlainRule {
         }
     }
 
-    /// The noise floor above the tare, in the sensor's unit; 0 of quantities that follow or need no rest.
-    pub(super) fn floor_above_tare(&self) -> f64 {
-        if self.quantity.needs_no_floor() { 0.0 } else { self.noise_floor }
-    }
-
     /// The time after the last input within which its last detection is complete, us.
     pub(super) fn reach_us(&self, period_us: f64) -> i64 {
         period_us.ceil() as i64 + self.limits().reach()

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{above_0, is_weight, weight_error};
@@ -60,9 +59,6 @@ pub struct Readout {
     /// How the rest of frames follows; `None`: it stays as it was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rest: Option<Following>,
-    /// The ranges of inputs in training that older files hold; not read.
-    #[serde(default, skip_serializing)]
-    pub seen: IgnoredAny,
     /// What the data of the training were like; `None` if it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training: Option<TrainingData>,
@@ -246,12 +242,6 @@ impl Readout {
             let labels = rule.labels.clone().map(|name| name.filter(|name| name == label));
             Some(PlainRule { labels, ..rule.clone() })
         })
-    }
-
-    /// The largest noise floor above the tare of what runs, in the sensor's unit; 0 without one.
-    pub(super) fn noise_floor(&self) -> f64 {
-        let of_neurons = if self.runs_neurons() { self.encoder.floor_above_tare() } else { 0.0 };
-        self.running_rules().map(|rule| rule.floor_above_tare()).fold(of_neurons, f64::max)
     }
 
     /// Whether a label is detected by its neuron.

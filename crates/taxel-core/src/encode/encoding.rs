@@ -29,11 +29,6 @@ pub(super) trait Encoding {
         0.0
     }
 
-    /// The noise floor above its tare, in the sensor's unit; 0 without one, or if its rest is not the tare.
-    fn floor_above_tare(&self) -> f64 {
-        0.0
-    }
-
     /// The trains of its stream.
     fn trains_of(&self, array: &Array) -> Trains {
         Trains { number: self.trains(array), kind: self.kind(), latency_ms: self.latency_ms() }

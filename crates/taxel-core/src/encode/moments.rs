@@ -190,10 +190,6 @@ impl Encoding for Moments {
         if self.graded { SpikeKind::Graded } else { SpikeKind::Unsigned }
     }
 
-    fn floor_above_tare(&self) -> f64 {
-        self.noise_floor
-    }
-
     fn set_tare(&mut self, tare: &Tare) {
         self.tare = Some(tare.clone());
     }

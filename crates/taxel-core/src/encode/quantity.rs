@@ -65,12 +65,6 @@ impl Quantity {
         matches!(self, Self::LocalLoad | Self::LocalRise | Self::LocalFall)
     }
 
-    /// Whether it is measured from running means or ranges, and not from the rest.
-    #[must_use]
-    pub fn needs_no_floor(self) -> bool {
-        self.is_local() || matches!(self, Self::RangeLoad | Self::Moved | Self::Rise | Self::Fall)
-    }
-
     /// Whether it counts by levels, which must then be given.
     #[must_use]
     pub fn has_levels(self) -> bool {

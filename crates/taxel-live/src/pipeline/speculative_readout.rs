@@ -183,7 +183,6 @@ mod tests {
             neurons: [("touch".to_owned(), cell)].into(),
             rules: BTreeMap::new(),
             by_rule: BTreeSet::new(),
-            seen: Default::default(),
             rest: None,
             training: None,
         };

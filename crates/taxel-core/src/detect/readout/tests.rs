@@ -30,7 +30,6 @@ fn readout() -> Readout {
         neurons: [("contact".to_owned(), cell(0.2, 3.0)), ("lift".to_owned(), cell(0.5, -0.1))].into(),
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
-        seen: Default::default(),
         rest: None,
         training: None,
     }
@@ -54,7 +53,7 @@ fn a_file_gives_every_number_back() {
     for (a, b) in again.neurons["lift"].weights.iter().zip(&readout.neurons["lift"].weights) {
         assert_eq!(a.to_bits(), b.to_bits());
     }
-    assert!(readout.to_json().starts_with("{\n  \"format\": \"taxel readout\",\n  \"version\": 1,"));
+    assert!(readout.to_json().starts_with("{\n  \"format\": \"taxel readout\",\n  \"version\": 2,"));
 }
 
 #[test]
@@ -65,8 +64,8 @@ fn files_that_are_no_readout_are_refused_by_name() {
         "[]",
         "{}",
         &good.replace("taxel readout", "other"),
-        &good.replace("\"version\": 1,", ""),
-        &good.replace("\"version\": 1,", "\"version\": 2,"),
+        &good.replace("\"version\": 2,", ""),
+        &good.replace("\"version\": 2,", "\"version\": 3,"),
         &good.replace("\"run_threshold\"", "\"threshold\""),
         &good.replace("\"neurons\"", "\"neuron\""),
         &good.replace("contact_area", "contact_are"),
