@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import contextmanager
 
 import numpy as np
@@ -114,7 +115,7 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
         assert [label["trial"] for label in labels].count("ball/1") == 5
         answer = page.ask("train")
         assert answer["type"] == "done", answer
-        assert "touch, neuron: " in page.since_asked("trained")["text"]
+        assert re.search(r"touch: \w+ runs: ", page.since_asked("trained")["text"])
         said = [message for message in page.said[page.asked :] if message["type"] in ("training", "trained")]
         assert said.pop()["type"] == "trained"
         assert said[0]["text"].startswith(f"reading {file}, after ")
