@@ -26,7 +26,7 @@ def test_the_first_line_says_held_out_and_the_next_ones_how_each_label_scored(tm
     recording, labels = recorded(tmp_path, 1, 12, late_us=7_000)
     code, out, _ = call(capsys, "train", recording, "--labels", labels, "-o", tmp_path / "r.json", "--tare", 0.08)
     lines = out.splitlines()
-    assert (code, lines[0]) == (0, "held out: 5 blocks of time (window 50 ms)")
+    assert (code, lines[0]) == (0, "held out: 5 blocks of time of one recording (window 50 ms)")
     ways = r"(neuron|rule)"
     for line, label in zip(lines[1:4:2], ("contact", "lift"), strict=True):
         said = rf"{label}: {ways} runs: 0 mistakes of 12 \({ways} 0\); known -[\d.]+ ms after the label, {ways} -[\d.]+"

@@ -53,6 +53,8 @@ class Training:
         The sources that no row of the labels names, where rows name sources: they are left out.
     constants_ms : mapping of str to float, ms
         By how much the labels of a name were later than what was felt, of those that were: it is taken off.
+    held_by : str
+        The column of which recordings of one value were held out together; "": each recording alone.
     """
 
     options: TrainOptions
@@ -65,6 +67,7 @@ class Training:
     warned: tuple[str, ...] = ()
     unlabelled: tuple[str, ...] = ()
     constants_ms: Mapping[str, float] = field(default_factory=dict)
+    held_by: str = ""
 
     @property
     def readout(self) -> Readout:
@@ -113,6 +116,7 @@ class Training:
             "recipe": self.options.recipe,
             "judged_on": self.scored.how,
             "held_out": self.held_out,
+            "held_by": self.held_by or None,
             "window_ms": self.options.window_ms,
             "recordings": [
                 {"recording": recording.title, "score": score.to_dict()}
@@ -155,6 +159,10 @@ class Training:
         first = f"not held out, but scored on its own training data {window}: {self.why}"
         if self.held_out:
             first = f"held out: {self.scored.how} {window}"
+            if self.held_by:
+                first += f", no {self.held_by} on both sides"
+            elif len({recording.title.removesuffix(recording.label) for recording in self.recordings}) > 1:
+                first += "; the same person may be on both sides (--hold-out)"
         scores = [line for label in self.readout.labels for line in self._scores(label)]
         about = list(self._about())
         room = _MOST_LINES - 1 - len(about)
