@@ -249,6 +249,9 @@ class TrainOptions:
     folds : int, optional
         Number of folds for scores on held-out data: folds of recordings, or of blocks of time in a single recording;
         0: score on the training data. Default: at most 5, as many as the recordings and the rarest label allow.
+    hold_out : str, optional
+        A column of the table of labels, or of recordings.csv (with the column recording) beside the recordings: those
+        of one person, object or sensor are held out together. Default: person where there is one, else group.
     window_ms : float, ms
         Largest distance of a detection from its event, ms.
     shift_ms : float, ms
@@ -270,6 +273,7 @@ class TrainOptions:
     tare: _TypedTare = None
     absorb_s: float | None = None
     folds: int | None = None
+    hold_out: Annotated[str | None, Parameter(metavar="COLUMN")] = None
     window_ms: float = 50.0
     shift_ms: float = 0.0
 
@@ -282,6 +286,8 @@ class TrainOptions:
         finite("window_ms", self.window_ms, least=0.0)
         if self.folds is not None and integer("folds", self.folds, 0) == 1:
             raise refused("folds", " is 1: must be 2 or more, or 0 for none")
+        if self.hold_out is not None and not text("hold_out", self.hold_out):
+            raise refused("hold_out", " is empty: must name a column")
         self._plan()
 
     def _plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:

@@ -10,7 +10,7 @@ from plain_rules import ARRAY, FLOOR, clocks, events, in_pieces, tare
 import taxel
 from taxel import Frames, Neuron, Readout
 from taxel.detect import Example, Part, PlainRule, Recipe, judge, run, score
-from taxel.detect.fit import Fitter, better_by_rule
+from taxel.detect.fit import Fitter, chosen
 from taxel.detections import Detections
 from taxel.encode import ContactArea, LevelCrossing
 
@@ -108,7 +108,33 @@ def test_what_is_better_beyond_chance_runs_else_what_knows_earlier(neuron, rule,
         [score(Detections(["on"] * (200 - n), events[n:], events[n:] + delay), {"on": events}) for n in wrong]
         for wrong, delay in ((neuron, 1_000), (rule, 2_000 if earlier else 1_000))
     ]
-    assert better_by_rule(["on"], 10.0, *ways) == (("on",) if better == "rule" else ())
+    choice = chosen(["on"], 10.0, *ways)["on"]
+    assert (choice.by_rule, choice.neuron.mistakes, choice.rule.mistakes) == (better == "rule", sum(neuron), sum(rule))
+
+
+@pytest.mark.parametrize(
+    ("neuron", "rule", "better", "by_chance"),
+    [
+        # Missed and late of each of four recordings: (0, 3) is 1.5 mistakes.
+        ([(0, 3)] * 4, [(1, 0)] * 4, "rule", False),
+        ([(0, 1)] * 4, [(1, 0)] * 4, "neuron", False),
+        ([(0, 2)] * 4, [(1, 0)] * 4, "rule", True),
+        ([(0, 30)] * 4, [(0, 30)] * 4, "rule", True),
+    ],
+)
+def test_a_detection_that_is_far_off_is_half_a_mistake(neuron, rule, better, by_chance):
+    events = 1_000_000 * np.arange(1, 101)
+    ways = [
+        [
+            score(Detections(["on"] * (100 - missed), t[missed:], t[missed:]), {"on": events})
+            for missed, late in wrong
+            for t in [events + 12_000 * (np.arange(100) >= 100 - late)]
+        ]
+        for wrong in (neuron, rule)
+    ]
+    choice = chosen(["on"], 10.0, *ways)["on"]
+    assert ("rule" if choice.by_rule else "neuron", choice.by_chance) == (better, by_chance)
+    assert [each[:2] for each in choice[-2:]] == [tuple(np.sum(wrong, axis=0)) for wrong in (neuron, rule)]
 
 
 @pytest.mark.filterwarnings("ignore:.*cannot be learnt")

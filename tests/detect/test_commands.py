@@ -180,7 +180,7 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     )
     assert page.count("9.npz</td>", held, own) == 1
     assert page.count("9.npz</td>", own, page.index("Output of the command")) == 1
-    assert out.startswith("held out: whole recordings, 3 folds (window 50 ms)\n")
+    assert out.startswith("held out: whole recordings, 3 folds (window 50 ms); ")
 
 
 @pytest.mark.usefixtures("drawn")

@@ -39,7 +39,7 @@ def test_whole_recordings_are_judged_by_what_was_trained_on_the_others() -> None
 def test_of_one_recording_each_event_is_judged_once_by_what_never_heard_it(k: int) -> None:
     (data,) = examples(9)
     ways, how = folds([data], k)
-    assert how == f"{k} blocks of time"
+    assert how == f"{k} blocks of time of one recording"
     events = np.sort(np.concatenate(list(data.labels.values())))
     held = [(stretch.start, stretch.stop) for way in ways for stretch in way.test]
     assert [sum(start <= t < stop for start, stop in held) for t in events] == [1] * len(events)

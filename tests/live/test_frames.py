@@ -20,7 +20,7 @@ import taxel
 from live.boards import LOOPBACK
 from taxel import Array, Frames, Tare
 from taxel.detect import PlainRule, Readout, run
-from taxel.detect.readout import run_watched
+from taxel.detect.readout import USES, run_watched
 from taxel.detections import Detection
 from taxel.encode import LevelCrossing
 from taxel.live import Live
@@ -125,6 +125,28 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert len(expected) >= 5
     assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
     assert [(d.label, d.t, d.known) for d in recording.detections] == [(d.label, d.t, d.known) for d in expected]
+
+
+@pytest.mark.parametrize("use", USES)
+def test_what_was_asked_detects_live(use: str) -> None:
+    values = touches(np.random.default_rng(4), 4, 4, 300, "N")
+    t = PERIOD_US * np.arange(len(values))
+    rule = PlainRule("area", 1.0, 1.0, noise_floor=20.0, unit="N", labels=("contact", None))
+    trained = readout_of(4, 4, "N")._with_rules({"contact": rule}, ["contact"])
+    tare, frames = Tare.take(Frames(np.zeros((2, 4, 4)), [0, 1], unit="N")), Frames(values, t, unit="N")
+    by = {way: run(trained.using(way), frames, tare=tare) for way in USES}
+    assert by["better"].t.tolist() == by["rule"].t.tolist() != by["neuron"].t.tolist()
+    found: list[Detection] = []
+    with served(lines_of(values, t)) as address:
+        source = f"lines+tcp:{address},array=4x4,time=1:us,unit=N"
+        with Live(readout=trained, use=use, tare=tare, sources=source, say=found.append) as live:
+            until(lambda: live.counters["frames"] == len(values))
+            live.stop()
+    assert [d.t for d in found] == by[use].t.tolist()
+    with pytest.raises(taxel.ProblemError, match=r"^use is 'both'"):
+        Live(readout=trained, use="both", sources="given,array=4x4,rate=10")
+    with pytest.raises(taxel.ProblemError, match=r"^use is 'neuron'"):
+        Live(readout=rule, use="neuron", sources="given,array=4x4,rate=10")
 
 
 def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import contextmanager
 
 import numpy as np
@@ -13,6 +14,7 @@ from shell import call, run_beside
 
 import taxel
 from taxel import Array, Calibration, Frames
+from taxel.detect.readout import USES
 from taxel.options import FullReading
 from taxel.panel import Panel
 from taxel.recording.kinds import recordings_in
@@ -114,14 +116,21 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
         assert [label["trial"] for label in labels].count("ball/1") == 5
         answer = page.ask("train")
         assert answer["type"] == "done", answer
-        assert "touch, neuron: " in page.since_asked("trained")["text"]
+        assert re.search(r"touch: \w+ runs: ", page.since_asked("trained")["text"])
         said = [message for message in page.said[page.asked :] if message["type"] in ("training", "trained")]
         assert said.pop()["type"] == "trained"
         assert said[0]["text"].startswith(f"reading {file}, after ")
         assert any("fold 2 of" in message["text"] for message in said), said
-        assert page.ask("read_out", readout="ball.csv.readout.json")["type"] == "done"
-        found = page.since_asked("detections")["detections"]
-        assert len(found) >= 4
+        # Without a rule, a rule detects nothing.
+        trained = taxel.Readout.load(tmp_path / "ball.csv.readout.json")
+        trained._with_rules({}).save(tmp_path / "neuron.json")
+        counts = {}
+        for use in USES:
+            assert page.ask("read_out", readout="neuron.json", use=use)["type"] == "done"
+            counts[use] = len(page.since_asked("detections")["detections"])
+        assert counts["better"] == counts["neuron"] >= 4
+        assert counts["rule"] == 0
+        assert page.ask("read_out", readout="neuron.json", use="both")["type"] == "refused"
     table = (tmp_path / "ball.csv.notes.csv").read_text().splitlines()
     assert table[0] == "label,t_us,recording"
     assert len(table) == 11

@@ -75,10 +75,11 @@ def test_play_label_train_and_watch_the_new_readout(
         press(page, "4")
         page.locator("#train").click()
         is_in(page, "running", "train")
-        shows(page, "train-text", "contact, neuron: ")
+        shows(page, "train-text", r"contact: \w+ runs: ")
         until(lambda: page.locator("#readout").input_value() == "played.readout.json", "it reads the recording")
         until(lambda: page.locator("#detection-list li").count() > 0, "its detections are listed")
         assert page.locator("#detection-marks span").count() > 0
+        page.locator("#use").select_option("neuron")
         found = [row.split() for row in page.locator("#detection-list li").all_inner_texts()]
         wanted = sorted((t_us / 1e6, label) for label, times in truth.items() for t_us in times)
         heard = [(float(t), label) for label, t, *_ in found]

@@ -19,6 +19,7 @@ from taxel.cli.app import OUTSIDE, WRONG_INPUT, Limits
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout, load
 from taxel.detect.drift import left_line
+from taxel.detect.readout import used
 from taxel.live import Summary
 from taxel.live.options import LiveOptions
 from taxel.tare import Tare, seconds_of
@@ -90,7 +91,7 @@ def for_live(typed: Any, seconds: float | None = None) -> dict[str, Any]:
     """
     options: dict[str, Any] = vars(typed)
     readout, size = options.get("readout"), options["array"]
-    trained = None if readout is None else load(readout)
+    trained = None if readout is None else used(load(readout), options.get("use", "better"))
     array = None if size is None else of_size(size)
     read = {"readout": trained, "array": array, "tare": _rest(options.get("tare"))}
     first_line_s = _ALWAYS_S if seconds is None else max(_FIRST_LINE_S, seconds)

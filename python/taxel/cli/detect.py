@@ -18,6 +18,7 @@ from taxel._base.times import begun
 from taxel.cli._say import say
 from taxel.cli.app import App, Flat
 from taxel.cli.task import OutOption, Output, one_or_several, paths_text, progress, say_warnings
+from taxel.detect.readout import used
 from taxel.detections import Detections
 from taxel.options import DetectOptions, Reading
 from taxel.spikes import to_ms
@@ -81,12 +82,12 @@ def detect(
         _check_target(out, opened)
         found = taxel.tasks.detect(loaded, opened, given, options, progress=update, workers=workers)
         found = replace(found, warnings=(*unread, *found.warnings))
-    used = loaded.using(options.use) if isinstance(loaded, taxel.Readout) else loaded
+    running = used(loaded, options.use)
     if out is not None:
         write_whole(out, lambda file: file.write(_table(found, out.suffix.lower())), overwrite=output.overwrite)
     say_warnings(found.warnings)
     against = paths_text(list(map(Path, truth))) if truth else None
-    printed = list(_lines(found, used, recordings, against, given=options.tare is not None, lists=lists))
+    printed = list(_lines(found, running, recordings, against, given=options.tare is not None, lists=lists))
     written = {"written": out, "report": None if report is None else report / "report.html"}
     files_written = {name: str(path) for name, path in written.items() if path is not None}
     output.say(
@@ -97,7 +98,7 @@ def detect(
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(
             report,
-            used,
+            running,
             found.outcomes,
             title=f"Detections of {readout} in {paths_text(recordings)}",
             warnings=[*found.unreliable, *found.warnings, *_remarks(found)],

@@ -49,6 +49,9 @@ class Example(NamedTuple):
     labels_of : str
         The quantity whose thresholds the labels are, as "total" where a data set derived them from it: a rule of that
         quantity is the labels' own, and stands apart. "" where there is none.
+    held_with : str
+        Examples of one value, as the person, object or sensor that they are of, share a fold, where `group` is part of
+        one; "": their groups alone.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class Example(NamedTuple):
     group: str = ""
     name: str = ""
     labels_of: str = ""
+    held_with: str = ""
 
 
 def name_of(k: int, example: Example) -> str:
@@ -116,7 +120,7 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        is_example = isinstance(example, tuple) and len(example) in range(2, 7)
+        is_example = isinstance(example, tuple) and len(example) in range(2, 8)
         source = recorded(example[0]) if is_example else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
@@ -124,16 +128,17 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
                 "and labels"
             )
         _, labels, *rest = example
-        optional: list[Any] = [None, "", "", ""]
+        optional: list[Any] = [None, "", "", "", ""]
         optional[: len(rest)] = rest
-        tare, group, name, labels_of = optional
+        tare, group, name, labels_of, held_with = optional
         name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
             raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
         times = {text("label", label): column(f"labels[{label!r}]", t, np.int64) for label, t in labels.items()}
         tare = None if tare is None else instance(f"{name}: tare", tare, Tare)
         group, labels_of = text(f"{name}: group", group), text(f"{name}: labels_of", labels_of)
-        sound.append(Example(source, times, tare, group, name, labels_of))
+        held_with = text(f"{name}: held_with", held_with)
+        sound.append(Example(source, times, tare, group, name, labels_of, held_with))
     return _padded(sound)
 
 

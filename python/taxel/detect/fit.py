@@ -35,7 +35,7 @@ from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score_together, tally
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.tuning import OFF, OFF_COST, Tuning
+from taxel.detect.tuning import OFF, Tuning
 from taxel.detections import Detections
 from taxel.encode import Composite, Encoder, LocalLoad, Moments
 from taxel.events import Events
@@ -49,6 +49,8 @@ from taxel.wire import FRAME_US
 _FEWER = 3
 #: ... and that share of the labels: of many labels some were never felt.
 _FEWER_SHARE = 0.05
+#: Of how many mistakes a detection is that is far off its label, where neuron and rule are compared.
+_OFF_COST = 0.5
 #: A rule that finds this share of the labels of its training says when they were felt.
 _ALIGNS = 0.95
 _NO_FRAMES = np.empty(0, np.int64)
@@ -280,13 +282,14 @@ class Fitter:
                 parts_found += tested
         each = ([one.by_neurons for one in found], [one.by_rules for one in found])
         ways = (self.scores(way, parts_found) for way in each)
-        better = better_by_rule(others, self.off_ms, *ways) if found else ()
-        return tuple(label for label in self.labels if label in sure or label in better)
+        better = chosen(others, self.off_ms, *ways) if found else {}
+        return tuple(label for label in self.labels if label in sure or (label in better and better[label].by_rule))
 
     def _surely_by_rule(self, folds: Sequence[Fold], tuned: Sequence[Rules]) -> frozenset[str]:
         """Return the labels that no neuron detects better than rules do, so that none needs to be fitted.
 
-        A rule makes no mistake in what it did not learn from, and knows before the neuron is trained to fire.
+        A rule makes no mistake in what it did not learn from, is never far off, and knows before the neuron is trained
+        to fire.
         """
         tested = [[self.scored(part) for part in fold.test] for fold in folds]
         by_rules = [self._by_rules(rules, part) for rules, each in zip(tuned, tested, strict=True) for part in each]
@@ -296,7 +299,8 @@ class Fitter:
             one, (_, delay_ms) = score.by_label[label], self._recipe.learner_of(label)
             received = self._recipe._received(self._recipe.points_of(label)[0].values)
             fires_ms = received.latency_ms + delay_ms
-            return not one.rank[0] and len(one.delays_ms) > 0 and bool(np.median(one.delays_ms) <= fires_ms)
+            right = not one.rank[0] and bool(np.all(np.abs(one.errors_ms) <= self.off_ms))
+            return right and len(one.delays_ms) > 0 and bool(np.median(one.delays_ms) <= fires_ms)
 
         return frozenset(label for label in self.labels if label in score.by_label and is_sure(label))
 
@@ -494,37 +498,66 @@ def _known(
     return known
 
 
-def better_by_rule(
-    labels: Sequence[str], off_ms: float, neurons: Sequence[Score], rules: Sequence[Score]
-) -> tuple[str, ...]:
-    """Return the labels that rules detect better than neurons, by scores of both in the same parts of recordings.
+class Made(NamedTuple):
+    """What one of neuron and rule made of the labels of a name."""
 
-    Better is what makes fewer mistakes, by more than a standard error of the paired difference over the parts; one that
-    is farther off than `off_ms` is part of a mistake (`taxel.detect.tune`). Where that is not told apart, what knows
-    earlier at the median is better, then what is nearer to its label, then the rule.
+    mistakes: int
+    """Missed and false."""
+    off: int
+    """How many detections are farther off their label than is right."""
+    known_ms: float
+    """Median time from label to `known`; infinite where nothing was found."""
+    error_ms: float
+    """Median distance of `t` from the label, either way; infinite where nothing was found."""
+
+
+class Choice(NamedTuple):
+    """Which of neuron and rule of a label is better."""
+
+    by_rule: bool
+    by_chance: bool
+    """Whether their mistakes differ by no more than by chance, so that what knows earlier is better."""
+    off_ms: float
+    """From how far off its label a detection is half a mistake."""
+    neuron: Made
+    rule: Made
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the choice as plain values; what is infinite is None."""
+        made = {
+            way: {name: None if value == np.inf else value for name, value in one._asdict().items()}
+            for way, one in (("neuron", self.neuron), ("rule", self.rule))
+        }
+        return self._asdict() | made
+
+
+def chosen(labels: Sequence[str], off_ms: float, neurons: Sequence[Score], rules: Sequence[Score]) -> dict[str, Choice]:
+    """Return which of neuron and rule detects each label better, by scores in the same parts of recordings.
+
+    Better is what makes fewer mistakes, by more than a standard error of the paired difference over the parts; a
+    detection farther off than `off_ms` is half of one. Where that is not told apart, what knows earlier at the median
+    is better, then what is nearer to its label; of two that are alike in all this the rule.
     """
 
     def joined(scores: Sequence[Score], label: str, what: str) -> NDArray[np.float64]:
         return np.concatenate([getattr(one.by_label[label], what) for one in scores if label in one.by_label])
 
-    def cost(scores: Sequence[Score], label: str) -> NDArray[np.float64]:
+    def made(scores: Sequence[Score], label: str) -> tuple[Made, NDArray[np.float64]]:
         of = [one.by_label.get(label) for one in scores]
-        return np.array(
-            [0.0 if one is None else one.rank[0] + OFF_COST * (np.abs(one.errors_ms) > off_ms).sum() for one in of]
-        )
-
-    def later(scores: Sequence[Score], label: str) -> tuple[float, float]:
+        counts = [(0, 0) if one is None else (one.rank[0], int((np.abs(one.errors_ms) > off_ms).sum())) for one in of]
+        wrong, off = np.array(counts).T
         known, error = joined(scores, label, "delays_ms"), np.abs(joined(scores, label, "errors_ms"))
-        return (float(np.median(known)), float(np.median(error))) if len(known) else (np.inf, np.inf)
+        late = (float(np.median(known)), float(np.median(error))) if len(known) else (np.inf, np.inf)
+        return Made(int(wrong.sum()), int(off.sum()), *late), wrong + _OFF_COST * off
 
-    def by_rule(label: str) -> bool:
-        more = cost(rules, label) - cost(neurons, label)
-        by_chance = np.sqrt(len(more)) * np.std(more, ddof=1) if len(more) > 1 else 0.0
-        if abs(more.sum()) > by_chance:
-            return bool(more.sum() < 0)
-        return later(rules, label) <= later(neurons, label)
+    def choice(label: str) -> Choice:
+        (neuron, its_cost), (rule, cost) = made(neurons, label), made(rules, label)
+        more = cost - its_cost
+        by_chance = abs(more.sum()) <= (np.sqrt(len(more)) * np.std(more, ddof=1) if len(more) > 1 else 0.0)
+        better = rule[2:] <= neuron[2:] if by_chance else more.sum() < 0
+        return Choice(bool(better), bool(by_chance), off_ms, neuron, rule)
 
-    return tuple(label for label in labels if by_rule(label))
+    return {label: choice(label) for label in labels}
 
 
 def _above(recipe: Recipe, noise_floor: float) -> Recipe:

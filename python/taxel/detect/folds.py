@@ -119,17 +119,19 @@ def folds_of(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequ
     count = integer("folds", k, 2, 2**31)
     parts = whole(examples)
     recordings = len(_group(examples, parts))
+    what = "groups" if any(example.held_with for example in examples) else "recordings"
     if recordings > 1 and count > recordings:
-        raise refused("folds", f" is {count}: must be at most {recordings}, the number of recordings")
-    how = f"{count} blocks of time" if recordings == 1 else f"whole recordings, {count} folds"
+        raise refused("folds", f" is {count}: must be at most {recordings}, the number of {what}")
+    how = f"{count} blocks of time of one recording" if recordings == 1 else f"whole {what}, {count} folds"
     return split(examples, parts, count), how
 
 
 def _group(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Part]]:
-    """Return the parts of each recording: those of examples of one group together."""
+    """Return the parts of each recording, or of all that are held out with it."""
     groups: dict[object, list[Part]] = {}
     for part in parts:
-        groups.setdefault(examples[part.example].group or part.example, []).append(part)
+        example = examples[part.example]
+        groups.setdefault(example.held_with or example.group or part.example, []).append(part)
     return list(groups.values())
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from operator import add
 from typing import Any
@@ -14,7 +14,7 @@ from taxel._base.messages import collected
 from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress
 from taxel.detect.examples import Example
-from taxel.detect.fit import Fitter, Found, Rules, Trained, better_by_rule
+from taxel.detect.fit import Choice, Fitter, Found, Rules, Trained, chosen
 from taxel.detect.folds import Fold, Part, folds_of
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Mistake, Score, mistakes_of, score, score_together
@@ -80,6 +80,8 @@ class Judged:
     by_rule : tuple of str
         The labels that their plain rule detects better than their neuron in all folds. The
         score of each fold is of what was better inside its training data.
+    choices : mapping of str to Choice
+        How the neuron and the rule of each label that has a rule compare in all folds.
     """
 
     scores: tuple[Score, ...]
@@ -90,6 +92,7 @@ class Judged:
     plain: PlainScore
     mistakes: tuple[Mistake, ...] = ()
     by_rule: tuple[str, ...] = ()
+    choices: Mapping[str, Choice] = field(default_factory=dict)
 
 
 def judge(
@@ -180,8 +183,8 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
         return [getattr(one, way) for of_fold in found for one in of_fold]
 
     parts = [fitter.scored(part) for fold in folds for part in fold.test]
-    chosen = [
-        _chosen(one, of_fold.readout.by_rule)
+    run = [
+        _run(one, of_fold.readout.by_rule)
         for of_fold, parts_found in zip(trained, found, strict=True)
         for one in parts_found
     ]
@@ -193,15 +196,16 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
     own_score = (own_rules, fitter.score(each("by_own"), parts)) if any(own_rules.values()) else None
     plain = PlainScore(tuned, None if fitter.lacks else rules, own_score, fitter.lacks)
     with_rules = [label for label in fitter.labels if tuned[label] is not None]
-    better = better_by_rule(with_rules, fitter.off_ms, *(fitter.scores(each(way), parts) for way in ways))
-    joined, truths = _by_example(fitter, parts, chosen)
+    choices = chosen(with_rules, fitter.off_ms, *(fitter.scores(each(way), parts) for way in ways))
+    better = tuple(label for label, choice in choices.items() if choice.by_rule)
+    joined, truths = _by_example(fitter, parts, run)
     scores = tuple(score(*compared, fitter.window_ms) for compared in zip(joined, truths, strict=True))
     together = score_together(joined, truths, fitter.window_ms)
     mistakes = mistakes_of(joined, truths, scores)
-    return Judged(scores, together, "", tuple(trained), neurons, plain, mistakes, better)
+    return Judged(scores, together, "", tuple(trained), neurons, plain, mistakes, better, choices)
 
 
-def _chosen(found: Found, by_rule: Sequence[str]) -> Detections:
+def _run(found: Found, by_rule: Sequence[str]) -> Detections:
     """Return the detections of some labels by rules, and those of all others by neurons, in the order of `known`."""
     of_rules, of_neurons = (
         detected[np.array([(label in by_rule) == ruled for label in detected.label], np.bool_)]

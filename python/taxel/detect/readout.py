@@ -377,6 +377,15 @@ class Readout(_Detector):
         )
 
 
+def used(readout: Readout | PlainRule, use: str) -> Readout | PlainRule:
+    """Return what detects each label as `Readout.using` says; a plain rule is no neuron."""
+    if isinstance(readout, Readout):
+        return readout.using(use)
+    if text("use", use, USES) == "neuron":
+        raise refused("use", " is 'neuron': must be 'better' or 'rule', because a plain rule is given")
+    return readout
+
+
 def rest_for(readout: _Detector, recording: Recording, tare: GivenTare | None = None) -> Rest | None:
     """Return the rest of a recording; None of one without a rest by its unit, if the readout needs none.
 

@@ -61,6 +61,9 @@ class Live(contextlib.AbstractContextManager["Live"]):
         The board sends intensity differences. The panel's "delta intensity".
     readout : Readout or PlainRule, optional
         A trained readout or a plain rule; without one nothing is detected.
+    use : {"better", "rule", "neuron"}
+        What detects each label: better (the better one in training), rule (its plain rule) or neuron. A label with no
+        rule is not detected by rule.
     tare : Tare or float, optional
         Rest of the taxels: a saved tare, or the seconds at rest at the beginning, from which a fresh tare is taken. For
         a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event

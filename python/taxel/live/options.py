@@ -16,6 +16,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import PlainRule, Readout
 from taxel.detect.detector import detector
+from taxel.detect.readout import USES, used
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -58,6 +59,12 @@ class LiveOptions:
         "A trained readout or a plain rule; without one nothing is detected.",
         metavar="FILE",
         typed="taxel train writes such files (JSON).",
+    )
+    use: str = option(
+        "better",
+        "What detects each label: better (the better one in training), rule (its plain rule) or neuron. A label with "
+        "no rule is not detected by rule.",
+        metavar="better|rule|neuron",
     )
     tare: Tare | float | None = option(
         None,
@@ -111,9 +118,10 @@ class LiveOptions:
     def completed(self) -> LiveOptions:
         """Return the options with the sensor of the readout; refuse options that make no sense."""
         readout, array, registers = self.readout, self.array, self.registers
+        text("use", self.use, USES)
         if readout is not None:
             detector("readout", readout)
-            readout = readout.absorbing(self.absorb_s)
+            readout = used(readout, self.use).absorbing(self.absorb_s)
         if array is None and readout is not None:
             array = readout.array
         elif readout is not None and readout.array is not None:
@@ -156,7 +164,7 @@ class LiveOptions:
 
 
 #: Options that are passed in another form, as the name of a file may be no text, or not at all.
-_APART = ("absorb_s", "record", "send", "sources", "first_line_s", "say")
+_APART = ("absorb_s", "use", "record", "send", "sources", "first_line_s", "say")
 
 
 def _plain(option: Field[Any], value: object) -> object:

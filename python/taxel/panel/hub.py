@@ -256,16 +256,16 @@ class Hub:
                 self._show_live(before._again(port=None, host=None, **nothing))
             raise
 
-    async def read_out(self, readout: Path) -> None:
+    async def read_out(self, readout: Path, use: str) -> None:
         """Read the live source out with another readout: time, values and the past begin again.
 
         A readout that needs a tare uses that of the board, if there is one; else the present values of the taxels are
         their rest, so the sensor must be unloaded.
         """
-        await self._begin_readout(lambda: load(readout))
+        await self._begin_readout(lambda: load(readout), use=use)
         await self._agree()
 
-    async def _begin_readout(self, loaded: Callable[[], Readout | PlainRule]) -> None:
+    async def _begin_readout(self, loaded: Callable[[], Readout | PlainRule], **changed: Any) -> None:
         def change(before: Live) -> Live:
             readout = loaded()
             tare = before.tare or (before._options.tare if before._options.readout is not None else None)
@@ -273,7 +273,7 @@ class Hub:
                 tare = _rest_of_held(before)
             held = {"registers": Registers._of(self.board.registers, before.array)} if self.board.known else {}
             before._pause()
-            return self._replaced(before, readout=readout, tare=tare, **held)
+            return self._replaced(before, readout=readout, tare=tare, **held, **changed)
 
         await self.restart(change)
 

@@ -531,18 +531,18 @@ class Session:
         await in_thread(self._hub.training.end)
 
     @long_request
-    async def read_out(self, readout: Annotated[str, line(110)]) -> None:
+    async def read_out(self, readout: Annotated[str, line(110)], use: Annotated[str, line(10)] = "better") -> None:
         """Read what this view shows with a readout or a plain rule of the folder.
 
         A recording: `detections` follows. The live source: from now on, for all clients; it begins again. A readout
-        that needs a tare uses that of the command, else what the taxels hold now.
+        that needs a tare uses that of the command, else what the taxels hold now. `use`: better, rule or neuron.
         """
         with at_field("readout"):
             path = self._hub.folder.file(readout)
         shown = self.shown
         if shown is None:
-            return await self._hub.read_out(path)
-        labels, found = await in_thread(self._hub.training.detect, shown.path, shown.asked, path)
+            return await self._hub.read_out(path, use)
+        labels, found = await in_thread(self._hub.training.detect, shown.path, shown.asked, path, use)
         message = {"type": "detections", "source": shown.name, "readout": readout, "labels": labels}
         await self.say(message | {"detections": found})
         return None

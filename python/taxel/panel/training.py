@@ -127,7 +127,9 @@ class Training:
             self._stopped = True
             training.end()
 
-    def detect(self, recording: Path, trial: str | None, readout: Path) -> tuple[list[str], list[dict[str, Any]]]:
+    def detect(
+        self, recording: Path, trial: str | None, readout: Path, use: str
+    ) -> tuple[list[str], list[dict[str, Any]]]:
         """Detect by a readout in a recording or its trial.
 
         Returns
@@ -135,11 +137,12 @@ class Training:
         tuple of list of str, and list of dict
             The readout's labels; the detections in the order in which they are known.
         """
+        from taxel.options import DetectOptions  # noqa: PLC0415
         from taxel.tasks import detect  # noqa: PLC0415  the command line starts quickly
 
         loaded = load(readout)
         opened, _ = self._files.opened(recording, trial)
-        detected = detect(loaded, opened).each
+        detected = detect(loaded, opened, options=DetectOptions(use=use)).each
         names = [each.recording.label or "" if len(detected) > 1 else "" for each in detected]
         found = [(found, name) for each, name in zip(detected, names, strict=True) for found in each.outcome.found]
         found.sort(key=lambda one: one[0].known)

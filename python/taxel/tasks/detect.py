@@ -12,7 +12,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from taxel._base.arguments import instance, shown
-from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress, reporting
@@ -23,7 +22,7 @@ from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.drift import left_line
 from taxel.detect.examples import unreliable
-from taxel.detect.readout import rest_for, run_watched
+from taxel.detect.readout import rest_for, run_watched, used
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -215,7 +214,7 @@ def detect(
     """
     detector("readout", readout)
     options = DetectOptions() if options is None else instance("options", options, DetectOptions)
-    readout = _used(readout, options.use).absorbing(options.absorb_s)
+    readout = used(readout, options.use).absorbing(options.absorb_s)
     update = reporting(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:
@@ -266,15 +265,6 @@ def detect(
     how = options.window_ms, options.shift_ms, options.use
     without = () if truth is None else (*(label for label in readout.labels if label not in known), *sources)
     return Detecting(each, together, tuple(unknown), without, *how, bad, tuple(warnings), tuple(failed))
-
-
-def _used(readout: Readout | PlainRule, use: str) -> Readout | PlainRule:
-    """Return what detects, as asked."""
-    if isinstance(readout, Readout):
-        return readout.using(use)
-    if use == "neuron":
-        raise refused("use", " is 'neuron': must be 'better' or 'rule', because a plain rule is given")
-    return readout
 
 
 def _score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:

@@ -173,6 +173,11 @@ def table_names(source: Tables) -> str:
     return few([str(source)] if isinstance(source, str | os.PathLike) else map(str, source))
 
 
+def opened_tables(source: GivenLabels, recordings: Sequence[Recording]) -> Labels | None:
+    """Return the tables that labels are given by as one; None of notes and times."""
+    return _opened(source, recordings) if are_tables(source) and source != "notes" else None
+
+
 def _opened(source: Tables, recordings: Sequence[Recording]) -> Labels:
     """Open tables of labels as one."""
     return Labels(source) if isinstance(source, str | os.PathLike) else _joined(source, recordings)

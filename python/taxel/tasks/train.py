@@ -31,6 +31,7 @@ from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import Rest, rest
 from taxel.recording.opening import sensors_of
+from taxel.tasks.held_together import held_together
 from taxel.tasks.info import sensor_lines
 from taxel.tasks.labels import GivenLabels, few, given_labels, labelled_trials
 from taxel.tasks.train_result import Training
@@ -121,7 +122,9 @@ def _train(
         options = replace(options, recipe=recipe)
     plan = options._plan(names)
     assert plan is not None
+    column, held_with = held_together(labels, opened, options.hold_out)
     examples = _examples(opened, labelled, rests, plan)
+    examples = [example._replace(held_with=of) for example, of in zip(examples, held_with, strict=True)]
     if labels == "notes":
         examples = [
             example._replace(labels_of=each._main.facts.labels_of)
@@ -166,7 +169,7 @@ def _train(
         lines = off_loads(fitter.examples, missed) or list(_mistaken(training))
         for line in [*lines, *(line for recording in opened for line in sensor_lines(recording))][:_LINES]:
             warn(line)
-    return replace(training, unlabelled=unlabelled, constants_ms=constants)
+    return replace(training, unlabelled=unlabelled, constants_ms=constants, held_by=column)
 
 
 def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]], update: Progress) -> None:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from shlex import quote
 from typing import Any
 
+import numpy as np
+
 from taxel._base.arguments import text
-from taxel._base.messages import three_digits
+from taxel._base.messages import counted, three_digits
 from taxel.detect import Judged, Outcome, Readout, Score, Trained, recipes
 from taxel.detect.examples import unreliable
 from taxel.detect.scoring import score_rows
@@ -22,8 +24,6 @@ from taxel.tare import Tare
 _LATE_MS = 500.0
 #: The width of a line, and how many are before the table.
 _WIDTH, _MOST_LINES = 160, 15
-#: What the written readout detects a label by.
-_RUNS = "; runs"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,8 @@ class Training:
         The sources that no row of the labels names, where rows name sources: they are left out.
     constants_ms : mapping of str to float, ms
         By how much the labels of a name were later than what was felt, of those that were: it is taken off.
+    held_by : str
+        The column of which recordings of one value were held out together; "": each recording alone.
     """
 
     options: TrainOptions
@@ -65,6 +67,7 @@ class Training:
     warned: tuple[str, ...] = ()
     unlabelled: tuple[str, ...] = ()
     constants_ms: Mapping[str, float] = field(default_factory=dict)
+    held_by: str = ""
 
     @property
     def readout(self) -> Readout:
@@ -113,6 +116,7 @@ class Training:
             "recipe": self.options.recipe,
             "judged_on": self.scored.how,
             "held_out": self.held_out,
+            "held_by": self.held_by or None,
             "window_ms": self.options.window_ms,
             "recordings": [
                 {"recording": recording.title, "score": score.to_dict()}
@@ -121,6 +125,7 @@ class Training:
             "score": self.scored.together.to_dict(),
             "neurons": self.scored.neurons.to_dict(),
             "by_rule": list(self.readout.by_rule),
+            "choices": {label: choice.to_dict() for label, choice in self.scored.choices.items()},
             "mistakes": [
                 {
                     "recording": self.recordings[k].name,
@@ -154,6 +159,10 @@ class Training:
         first = f"not held out, but scored on its own training data {window}: {self.why}"
         if self.held_out:
             first = f"held out: {self.scored.how} {window}"
+            if self.held_by:
+                first += f", no {self.held_by} on both sides"
+            elif len({recording.title.removesuffix(recording.label) for recording in self.recordings}) > 1:
+                first += "; the same person may be on both sides (--hold-out)"
         scores = [line for label in self.readout.labels for line in self._scores(label)]
         about = list(self._about())
         room = _MOST_LINES - 1 - len(about)
@@ -225,22 +234,38 @@ class Training:
             yield f"rest: measured separately in each of {len(lasts_ms)} recordings, for {lasts}; --tare sets another"
 
     def _scores(self, label: str) -> Iterator[str]:
-        """Yield how the neuron and the plain rule of a label scored on the same labels, and which of them runs."""
-        by_rule, plain = label in self.readout.by_rule, self.scored.plain
+        """Yield which of the neuron and the plain rule of a label runs, how both did, and the rule."""
+        plain = self.scored.plain
         rule = plain.rules[label]
-        yield _line(label, "neuron", self.scored.neurons[label]) + _RUNS * (rule is not None and not by_rule)
+        yield self._choice(label)
         if plain.together is None:
             yield f"no plain rule for {label}: {plain.lacks}"
         elif rule is None:
             yield f"no plain rule for {label}: none is better than to detect nothing"
         else:
-            when = "when the touch ends" if rule.age_ms == "end" else ""
-            better = self.scored.neurons[label].rank[0] < plain.together[label].rank[0]
-            runs = _RUNS + ", as the neuron's lead may be chance" * better
-            yield _line(label, "plain rule", plain.together[label], when) + runs * by_rule
-            yield f"  tuned on all: {rule._compared()}"
+            yield f"  rule, tuned on all: {rule._compared()}"
         if plain.own is not None and (own := plain.own[0][label]) is not None:
-            yield _line(label, "the labels' own rule", plain.own[1][label]) + f": {own._compared()}"
+            its = plain.own[1][label]
+            yield f"{label}, the labels' own rule: {_mistakes(its)} of {its.events}: {own._compared()}"
+
+    def _choice(self, label: str) -> str:
+        """Return what runs of a label, its mistakes and when it is known, each beside the other's."""
+        events, scored = self.scored.neurons[label].events, self.scored
+        if (choice := scored.choices.get(label)) is None:
+            neuron = scored.neurons[label]
+            return f"{label}: neuron runs: {_mistakes(neuron)} of {events}; {_known(neuron.delay.median)}"
+        names = ("rule", "neuron") if label in self.readout.by_rule else ("neuron", "rule")
+        runs, other = (getattr(choice, name) for name in names)
+        wrong, others = f"{counted(runs.mistakes, 'mistake')} of {events}", f"{names[1]} {other.mistakes}"
+        if runs.off or other.off:
+            wrong += f", {runs.off} more than {choice.off_ms:g} ms off"
+            others += f", {other.off}"
+        if choice.by_chance and (other.mistakes, other.off) < (runs.mistakes, runs.off):
+            others += ", which may be chance"
+        rule = scored.plain.rules[label]
+        when = ", when the touch ends" * (names[0] == "rule" and rule is not None and rule.age_ms == "end")
+        known = f"{_known(runs.known_ms)}{when}, {names[1]} {_late(other.known_ms)}"
+        return f"{label}: {names[0]} runs: {wrong} ({others}); {known}"
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing."""
@@ -269,15 +294,17 @@ def _cut(line: str) -> str:
     return line if len(line) <= _WIDTH else f"{line[: _WIDTH - 3]}..."
 
 
-def _line(label: str, by: str, score: Score, when: str = "") -> str:
-    """Return a score; `when` its detections are known, if that is late."""
-    known = "never known"
-    if score.found:
-        median_ms, most_ms = score.delay.median, float(score.delays_ms.max())
-        known = f"known {three_digits(median_ms, '+')} ms after the label (median)"
-        if median_ms >= _LATE_MS:
-            late = (
-                f"known {to_us(median_ms) / 1e6:.1f} s after the label (median; at most {to_us(most_ms) / 1e6:.1f} s)"
-            )
-            known = f"{late}, {when}".removesuffix(", ")
-    return f"{label}, {by}: {score.found} of {score.events} found, {score.missed} missed, {score.false} false, {known}"
+def _mistakes(score: Score) -> str:
+    return counted(score.rank[0], "mistake")
+
+
+def _known(ms: float) -> str:
+    """Return when detections are known, of the median time after their labels."""
+    return f"known {_late(ms, unit=True)} after the label" if np.isfinite(ms) else "never known"
+
+
+def _late(ms: float, *, unit: bool = False) -> str:
+    """Return a time after a label; long ones in s."""
+    if not np.isfinite(ms):
+        return "never"
+    return f"{to_us(ms) / 1e6:.1f} s" if ms >= _LATE_MS else three_digits(ms) + " ms" * unit

@@ -670,6 +670,7 @@ export interface ReadOutRequest {
   type: "read_out";
   id?: number;
   readout: string;
+  use?: string;
 }
 
 export interface CutRequest {

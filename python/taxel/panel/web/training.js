@@ -30,6 +30,9 @@ export class Training {
     this.reads = "";
     this.readout = part("readout", HTMLSelectElement);
     this.readout.onchange = () => this.read(this.readout.value);
+    /** What detects each label: the better in training, its plain rule or its neuron. */
+    this.use = part("use", HTMLSelectElement);
+    this.use.onchange = () => this.read(this.readout.value);
   }
 
   async begin() {
@@ -80,10 +83,11 @@ export class Training {
     const { source } = this;
     const { t_us } = this.player;
     this.readout.value = readout;
+    this.use.hidden = !readout;
     this.chosen();
     if (readout) notify(`${readout} reads ${source ?? "the board: leave the sensor at rest for the tare"}`);
     /** @type {import("./messages.js").Request} */
-    const request = readout ? { type: "read_out", readout } : source === null ? { type: "live" } : { type: "open", name: source };
+    const request = readout ? { type: "read_out", readout, use: this.use.value } : source === null ? { type: "live" } : { type: "open", name: source };
     try {
       await this.server.request(request);
       if (source !== this.source) return;
@@ -93,6 +97,7 @@ export class Training {
     } catch (error) {
       if (source === this.source && this.readout.value === readout) {
         this.readout.value = this.reads;
+        this.use.hidden = !this.reads;
         this.chosen();
       }
       failed(error);
@@ -113,6 +118,7 @@ export class Training {
     if (source === this.source) return;
     this.source = source;
     this.reads = this.readout.value = "";
+    this.use.hidden = true;
     if (this.since === null) this.text("");
     this.show();
   }
