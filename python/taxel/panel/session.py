@@ -24,6 +24,7 @@ from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
 from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
+from taxel.panel.regions import Drawn, RegionLoads, read_beside, regions_beside, write_beside
 from taxel.panel.shown_files import judged
 from taxel.panel.threads import in_thread
 
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 #: Frames on their way, labels of a request, long requests at a time, changes of labels that can be undone.
 _MOST_CREDITS, _MOST_LABELS, _MOST_LONG, _MOST_CHANGES = 8, 5000, 8, 1000
+#: Regions of a recording, and columns of their curves.
+_MOST_REGIONS, _MOST_COLUMNS = 200, 2048
 #: Characters of a layout.
 _MOST_LAYOUT = 500_000
 
@@ -462,6 +465,48 @@ class Session:
         lost = await in_thread(self._hub.folder.files.cut, shown.path, shown.asked, out, begin, end)
         await self._hub.say(await self._hub.recordings())
         await self.say({"type": "cut", "name": name, "lost": lost})
+
+    # ------------------------------------------------------------------------------------------ requests: regions
+
+    @long_request
+    async def regions(self) -> None:
+        """Send `regions`: those of the file beside the recording shown, NAME.regions.json."""
+        shown, loads = await self._loads()
+        found = loads.drawn(await in_thread(read_beside, shown.path))
+        file = regions_beside(shown.path).name
+        await self.say({"type": "regions", "source": shown.name, "file": file, "unit": loads.unit, "regions": found})
+
+    @long_request
+    async def loads(
+        self,
+        regions: Annotated[list[Drawn], Meta(max_length=_MOST_REGIONS)],
+        first: Annotated[int, whole(-(2**52), 2**52)],
+        count: Annotated[int, whole(1, _MOST_COLUMNS)],
+        column_us: Annotated[int, whole(1, 2**40)],
+    ) -> None:
+        """Send `loads`: least and greatest load of each region in columns of time, of which the first is `first`.
+
+        Column k begins at k times its width. The load is the force, or the sum of the values where no force is known.
+        """
+        shown, loads = await self._loads()
+        curves = await in_thread(loads.curves, regions, first, count, column_us)
+        begin = {"type": "loads", "source": shown.name, "first": first, "count": count, "column_us": column_us}
+        await self.say(begin | {"curves": curves})
+
+    @request
+    async def write_regions(
+        self, regions: Annotated[list[Drawn], Meta(min_length=1, max_length=_MOST_REGIONS)], replace: bool = False
+    ) -> None:
+        """Write the regions to NAME.regions.json beside the recording shown.
+
+        Refused at `replace` if that file is there, unless `replace` is true.
+        """
+        shown, loads = await self._loads()
+        await in_thread(write_beside, shown.path, loads.regions(regions), replace=replace)
+
+    async def _loads(self) -> tuple[Shown, RegionLoads]:
+        shown = self._needed("regions")
+        return shown, await in_thread(self._hub.folder.files.loads, shown.path, shown.asked, shown.us)
 
     # ------------------------------------------------------------------------------------------ requests: labels
 

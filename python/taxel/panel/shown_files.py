@@ -20,6 +20,7 @@ from taxel.formats.layout import Layout, layout_name
 from taxel.frames import Frames
 from taxel.labels import Labels, beside, by_clock
 from taxel.options import FullReading
+from taxel.panel.regions import RegionLoads
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health, judge
 from taxel.recording.analysis.quiet import ticks_by_unit
@@ -188,6 +189,9 @@ class ShownFiles:
         self._lock = threading.Lock()
         #: The trials of the file with several that was read last, by its path and state.
         self._trials: tuple[tuple[Path, FileState], list[Recording]] | None = None
+        #: The loads of the recording whose regions were asked for last, and the lock of what reads them.
+        self._loads: tuple[tuple[Path, FileState, str | None], RegionLoads] | None = None
+        self._loading = threading.Lock()
 
     def check(self, path: Path) -> None:
         """Refuse a file of another program while a recording runs.
@@ -263,6 +267,20 @@ class ShownFiles:
                 if kind in found:
                     found[kind] += [(x + left, y) for x, y in taxels]
         return {"taxels": array.taxels, **found, "untested": untested}
+
+    def loads(self, path: Path, trial: str | None, us: int) -> RegionLoads:
+        """Return the loads of the regions of a recording, read once.
+
+        Raises
+        ------
+        ProblemError : as of `RegionLoads`
+        """
+        key = path, state_of(path), trial
+        with self._loading:
+            if self._loads is None or self._loads[0] != key:
+                self._loads = None
+                self._loads = key, RegionLoads(self.opened(path, trial)[0], us)
+            return self._loads[1]
 
     def cut(self, path: Path, trial: str | None, out: Path, start_us: int, stop_us: int) -> list[str]:
         """Write a stretch of a recording to a new file; return what that file cannot hold."""

@@ -6,11 +6,14 @@ import { counted, rounded } from "./words.js";
 /** @typedef {import("./messages.js").ArrayInfo} ArrayInfo */
 /** @typedef {import("./messages.js").FrameSourceInfo} FrameSourceInfo */
 /** @typedef {[number, number]} Taxel column and row */
+/** @typedef {[number, number]} Place x and y, in the unit of the array's centre */
 
 /** Room around the outermost places of a sensor, in the distance between neighbours. */
 const MARGIN = 0.75;
 /** Size of a place's dot in the distance between neighbours. */
 const DOT = 0.62;
+/** The corners of a cell around its middle. @type {readonly Place[]} */
+const CELL = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
 
 /** What all sensors have: rows, columns, and the sources that stand side by side. */
 class Sensor {
@@ -114,6 +117,27 @@ class Grid extends Sensor {
     return [index(across, this.columns), index(down, this.rows)];
   }
 
+  /** @param {Place} place @returns {[number, number]} where it is seen, in shares of width and height */
+  seen([x, y]) {
+    const [across, down] = this.step;
+    return this.place([x / across, y / down]);
+  }
+
+  /** @param {number} across @param {number} down shares of width and height @returns {Place} */
+  where(across, down) {
+    return [(across * this.columns - 0.5) * this.step[0], (down * this.rows - 0.5) * this.step[1]];
+  }
+
+  /** @returns {Place} from a taxel to the next one */
+  get step() {
+    return this.mm ? [this.mm[1], this.mm[0]] : [1, 1];
+  }
+
+  /** @param {Taxel} taxel @returns {Place[]} the corners of its cell */
+  cell([x, y]) {
+    return CELL.map(([a, b]) => [(x + a) * this.step[0], (y + b) * this.step[1]]);
+  }
+
   /** @param {number} x @param {number} y @returns {string} a centre, in columns and rows; in mm, too, where the pitch is known */
   centre(x, y) {
     return `${x.toFixed(1)}, ${y.toFixed(1)}${this.mm ? ` (${rounded(x * this.mm[1])}, ${rounded(y * this.mm[0])} mm)` : ""}`;
@@ -186,6 +210,28 @@ class Placed extends Sensor {
   place([x, y]) {
     const taxel = y * this.columns + x;
     return this.share(this.places.x[taxel], this.places.y[taxel]);
+  }
+
+  /** @param {Place} place @returns {[number, number]} where it is seen, in shares of width and height */
+  seen([x, y]) {
+    return this.share(x, y);
+  }
+
+  /** @param {number} across @param {number} down shares of width and height @returns {Place} */
+  where(across, down) {
+    const scale = this.scaled();
+    return [(across - 0.5) / scale + this.from[0] + this.extent[0] / 2, (down - 0.5) / scale / this.aspect + this.from[1] + this.extent[1] / 2];
+  }
+
+  /** @returns {Place} a tenth of the way from a taxel to the next one */
+  get step() {
+    return [this.near / 10, this.near / 10];
+  }
+
+  /** @param {Taxel} taxel @returns {Place[]} the corners of the dot's square */
+  cell([x, y]) {
+    const [a, b] = [this.places.x[y * this.columns + x], this.places.y[y * this.columns + x]];
+    return CELL.map(([across, down]) => [a + across * this.near, b + down * this.near]);
   }
 
   /** @param {number} across @param {number} down @returns {Taxel} the nearest one */

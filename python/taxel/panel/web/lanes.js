@@ -5,6 +5,7 @@ import { make, part, themed, write } from "./dom.js";
 import { movable } from "./arrangement.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { Raster } from "./raster.js";
+import { regionColour } from "./regions.js";
 import uPlot from "./vendor/uPlot.js";
 import { rounded, integer } from "./words.js";
 
@@ -22,6 +23,7 @@ import { rounded, integer } from "./words.js";
  * @property {{ unit: string, step: number }} sums unit of the sum of the values, and size of a tick in it
  * @property {number | null} gap_us how long frames of a live source may be away until the curves have a gap; null: however long
  * @property {number} top ticks above rest that fill the room of a channel's curve
+ * @property {import("./regions.js").Regions} regions of the recording
  */
 
 /**
@@ -183,6 +185,25 @@ export const LANES = [
     at: ({ sums: { step } }, timeline, column) => timeline.drawn.flatMap((curve) => ends(timeline.sumIn(column, curve), step)),
   },
   {
+    name: "regions", label: "Force of each region, or sum of its values",
+    fits: ({ regions }) => regions.all.length > 0,
+    heading: ({ regions }) => [
+      make("b", {}, regions.unit === "N" ? "Force of regions" : "Sum of regions"),
+      ...regions.all.flatMap(({ name }, k) => {
+        const colour = swatch("");
+        colour.style.background = regionColour(k);
+        return [" ", colour, ` ${name} `, output()];
+      }),
+    ],
+    says: ({ regions }) => regions.all.map((region) => regions.says(region)),
+    plan: (shown) => ({
+      scales: { regions: { range: fromZero(() => 1e-6) } },
+      ...extents(shown().regions.all.map((_, k) => regionColour(k)), "regions"),
+      axes: [axis("regions", themed("dim"))],
+    }),
+    at: ({ regions }, { number, column_us }, column) => regions.all.flatMap((region) => regions.at(region, number[column], column_us) ?? [null, null]),
+  },
+  {
     name: "area", label: "Number of taxels pressed", kind: "low",
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
@@ -268,8 +289,8 @@ export class Lanes {
   renew() {
     const { sources } = this;
     const shown = this.shown();
-    const { sensor, sums } = shown;
-    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, sources]);
+    const { sensor, sums, regions } = shown;
+    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, sources, regions.named]);
     if (this.made === key) return;
     this.made = key;
     const grid = { stroke: themed("grid"), width: 1 };
@@ -315,8 +336,8 @@ export class Lanes {
     }
   }
 
-  /** @param {Timeline} timeline @param {import("./timeline.js").Tick[]} ticks of its axis */
-  draw(timeline, ticks) {
+  /** @param {Timeline} timeline @param {import("./timeline.js").Tick[]} ticks of its axis @param {string} [only] the lane to draw; default: all */
+  draw(timeline, ticks, only) {
     const { columns, window, column_us } = timeline;
     const shown = this.shown();
     this.sources = shown.sensor.sources.slice(0, timeline.source_count).map(({ name }) => name);
@@ -325,7 +346,7 @@ export class Lanes {
     this.splits = ticks.map(({ share }) => share * this.span_s);
     const gaps = shown.gap_us !== null && columns ? timeline.gaps(columns[0] - 1, columns[1], shown.gap_us) : new Set();
     for (const { lane, block, painter, plot } of this.all) {
-      if (block.hidden) continue;
+      if (block.hidden || (only && only !== lane.name)) continue;
       painter?.draw(timeline);
       if (!plot || !lane.at || !columns || !window) continue;
       // A column more on the left, so that curves begin at the edge.

@@ -18,6 +18,7 @@ import { Player } from "./player.js";
 import { readFrame } from "./protocol.js";
 import { Pointed } from "./pointed.js";
 import { Recorder } from "./recorder.js";
+import { Regions } from "./regions.js";
 import { Roles } from "./roles.js";
 import { Sensor } from "./sensor.js";
 import { RefusedError, Server } from "./server.js";
@@ -58,6 +59,8 @@ const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.c
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const pointed = new Pointed(server, () => timeline);
 const maps = new Maps(settings, watch);
+// Their curves are drawn at once, while a border is dragged.
+const regions = new Regions(server, maps, () => timeline, () => timeline && lanes.draw(timeline, timeWindow.ticks(timeline), "regions"), showLanes);
 const lanes = new Lanes(settings, shown);
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
 const notes = new Notes(player, labels);
@@ -148,7 +151,7 @@ function shown() {
   const newtons = opened?.frames?.newtons ?? null;
   // The sum of the values is a force where they are in N, or where it is known of a pressure.
   const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
-  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), top: timeline?.channelTop() ?? 1 };
+  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), top: timeline?.channelTop() ?? 1, regions };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */
@@ -261,6 +264,10 @@ function receive(message) {
       return roles.take(message);
     case "seen":
       return roles.see(message);
+    case "regions":
+      return regions.take(message);
+    case "loads":
+      return regions.takeLoads(message);
     case "cut":
       return notify(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
     case "warning":
@@ -317,6 +324,7 @@ function turnTo(shown) {
   history.replaceState(null, "", `#${fragment}`);
   silence();
   maps.forget();
+  regions.choose(shown);
 }
 
 /** Asks for a recording, or for a trial of it; says so while it is read. @param {string} name @param {string} [trial] */
@@ -450,6 +458,7 @@ function drawFrame(now_ms) {
         // Grid and numbers are of one picture.
         const ticks = timeWindow.ticks(timeline);
         lanes.draw(timeline, ticks);
+        regions.ask();
         timeWindow.writeAxis(ticks);
       }
       labels.arrange();

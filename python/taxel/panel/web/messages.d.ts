@@ -500,6 +500,32 @@ export interface Cut {
   lost: string[];
 }
 
+/** A region: corners in the unit of the array's centre, or column and row of each taxel. */
+export interface DrawnRegion {
+  name: string;
+  corners: [number, number][];
+  taxels: [number, number][];
+}
+
+/** The regions of the file beside a recording, its name, and the unit of their curves. */
+export interface Regions {
+  type: "regions";
+  source: string;
+  file: string;
+  unit: string;
+  regions: DrawnRegion[];
+}
+
+/** Least and greatest load of each region that was asked for in columns of time; null where there is no frame. A text says why a region has none. */
+export interface Loads {
+  type: "loads";
+  source: string;
+  first: number;
+  count: number;
+  column_us: number;
+  curves: (([number, number] | null)[] | string)[];
+}
+
 /** After the messages about everything that the request changed. */
 export interface Done {
   type: "done";
@@ -681,6 +707,27 @@ export interface CutRequest {
   name: string;
 }
 
+export interface RegionsRequest {
+  type: "regions";
+  id?: number;
+}
+
+export interface LoadsRequest {
+  type: "loads";
+  id?: number;
+  regions: DrawnRegion[];
+  first: number;
+  count: number;
+  column_us: number;
+}
+
+export interface WriteRegionsRequest {
+  type: "write_regions";
+  id?: number;
+  regions: DrawnRegion[];
+  replace?: boolean;
+}
+
 /** A label of a recording. */
 export interface LabelRow {
   label: string;
@@ -766,6 +813,8 @@ export type Message =
   | Labels
   | Health
   | Cut
+  | Regions
+  | Loads
   | Done
   | Refused
   | Warning
@@ -800,6 +849,9 @@ export type Request =
   | TrainStopRequest
   | ReadOutRequest
   | CutRequest
+  | RegionsRequest
+  | LoadsRequest
+  | WriteRegionsRequest
   | ChangeRequest
   | PortsRequest
   | GuessRequest
