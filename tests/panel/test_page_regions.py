@@ -11,7 +11,7 @@ from tests.panel.pages import press, shown, shows, until
 
 import taxel
 from taxel import Array, Frames, Region
-from taxel.panel.regions import RegionLoads
+from taxel.panel.regions import Drawn, RegionLoads
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -52,6 +52,18 @@ def test_a_curve_is_the_force_of_a_region_in_columns_of_time(walk: Path, region:
             assert found == pytest.approx((force[inside].min(), force[inside].max()), abs=1e-3)
 
 
+def test_a_region_without_a_curve_has_the_reason_instead_and_others_keep_theirs(walk: Path) -> None:
+    crossing = Drawn("crossing", [(0, 0), (30, 30), (30, 0), (0, 30)], [])
+    beside = Drawn("beside", [(90, 0), (99, 0), (99, 9)], [])
+    missing = Drawn("missing", [], [(8, 0)])
+    *reasons, curve = RegionLoads(taxel.open(walk), 1).curves(
+        [crossing, beside, missing, Drawn("toes", [], list(TOES.taxels))], 8, 1, 64_000
+    )
+    assert all(name in str(reason) for name, reason in zip(("crossing", "beside", "missing"), reasons, strict=True))
+    assert all(isinstance(reason, str) for reason in reasons)
+    assert isinstance(curve, list)
+
+
 def _corners(page: Any, k: int) -> list[list[float]]:
     """Return the corners of a region as it is drawn on the map, mm."""
     points = page.locator("#pressure-regions [data-grip]").nth(k).get_attribute("points")
@@ -75,11 +87,11 @@ def _drag(page: Any, *places: tuple[float, float]) -> None:
     page.mouse.up()
 
 
-def _output(page: Any, k: int) -> str:
+def _output(page: Any, k: int) -> Any:
     return page.locator("#regions-block h2 output").nth(k).inner_text()
 
 
-def _names(page: Any) -> list[str]:
+def _names(page: Any) -> Any:
     return page.locator("#region-list input").evaluate_all("all => all.map(one => one.value)")
 
 
@@ -120,7 +132,7 @@ def draws(page: Any) -> None:
     # The crosshair begins in the middle, column 4 and row 6.
     for key in ["ArrowUp", *["ArrowUp"] * 4, "ArrowRight", "Enter", "ArrowRight", "Enter", "Escape"]:
         page.keyboard.press(key)
-    until(lambda: _names(page) == ["heel", "toes", "region 3", "region 4", "region 5"], "three regions more")
+    until(lambda: _names(page) == ["heel", "toes", "part 3", "part 4", "part 5"], "three regions more")
 
 
 def moves(page: Any) -> None:

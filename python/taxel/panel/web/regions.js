@@ -178,9 +178,9 @@ export class Regions {
   add(corners, taxels) {
     const taken = new Set(this.all.map(({ name }) => name));
     let number = this.all.length + 1;
-    while (taken.has(`region ${number}`)) number++;
+    while (taken.has(`part ${number}`)) number++;
     this.chosen = this.next++;
-    this.change([...this.all, { name: `region ${number}`, corners, taxels, id: this.chosen }]);
+    this.change([...this.all, { name: `part ${number}`, corners, taxels, id: this.chosen }]);
   }
 
   /** @param {Region} region @param {Partial<Region>} parts @returns {Region[]} */
