@@ -121,7 +121,7 @@ def test_the_page_takes_the_same_rest_also_where_a_touch_begins_the_recording(tm
     rule.save(tmp_path / "rule.json")
     found = detect(rule, taxel.open(tmp_path / "a.npz")).outcomes[0].found
     assert found.t.tolist()[-4:] == [1_200_000, 1_320_000, 2_200_000, 2_320_000]
-    page = Training(Opening(), ShownFiles()).detect(tmp_path / "a.npz", None, tmp_path / "rule.json")
+    page = Training(Opening(), ShownFiles()).detect(tmp_path / "a.npz", None, tmp_path / "rule.json", "better")
     assert [one["t_us"] for one in page[1]] == found.t.tolist()
 
 

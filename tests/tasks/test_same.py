@@ -60,5 +60,5 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_and_the_page
     assert repr(taxel.detect.score(by_hand, rec.notes)) == repr(truth.each[0].outcome.score)
     [one] = found["recordings"]
     assert {key: shown[key] for key in one} == one
-    labels, detections = requests().detect(place, None, readout)
+    labels, detections = requests().detect(place, None, readout, "better")
     assert (labels, moments(detections)) == (["contact", "lift"], moments(one["detections"]))

@@ -516,7 +516,7 @@ class Choice(NamedTuple):
 
     by_rule: bool
     by_chance: bool
-    """Whether their mistakes differ by no more than by chance, so that what knows earlier is better."""
+    """Whether their mistakes differ by no more than by chance, so that what knows much earlier is better."""
     off_ms: float
     """From how far off its label a detection is half a mistake."""
     neuron: Made
@@ -535,8 +535,8 @@ def chosen(labels: Sequence[str], off_ms: float, neurons: Sequence[Score], rules
     """Return which of neuron and rule detects each label better, by scores in the same parts of recordings.
 
     Better is what makes fewer mistakes, by more than a standard error of the paired difference over the parts; a
-    detection farther off than `off_ms` is half of one. Where that is not told apart, what knows earlier at the median
-    is better, then what is nearer to its label; of two that are alike in all this the rule.
+    detection farther off than `off_ms` is half of one. Where that is not told apart, what knows earlier by more than
+    `off_ms` at the median is better, then what makes fewer, then what is nearer to its label, and last the rule.
     """
 
     def joined(scores: Sequence[Score], label: str, what: str) -> NDArray[np.float64]:
@@ -554,7 +554,11 @@ def chosen(labels: Sequence[str], off_ms: float, neurons: Sequence[Score], rules
         (neuron, its_cost), (rule, cost) = made(neurons, label), made(rules, label)
         more = cost - its_cost
         by_chance = abs(more.sum()) <= (np.sqrt(len(more)) * np.std(more, ddof=1) if len(more) > 1 else 0.0)
-        better = rule[2:] <= neuron[2:] if by_chance else more.sum() < 0
+        earlier_ms = neuron.known_ms - rule.known_ms
+        if not by_chance or not abs(earlier_ms) > off_ms:
+            better = (more.sum(), rule.error_ms) <= (0.0, neuron.error_ms)
+        else:
+            better = earlier_ms > 0.0
         return Choice(bool(better), bool(by_chance), off_ms, neuron, rule)
 
     return {label: choice(label) for label in labels}
