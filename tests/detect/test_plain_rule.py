@@ -1,5 +1,7 @@
 """A plain rule against a loop over frames, written from its documentation; pieces, frames, files, live, tuning."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -98,6 +100,37 @@ def test_a_load_by_running_range_is_what_a_loop_over_frames_adds():
     pieces = [stream.push(frames[k : k + 7]) for k in range(0, len(t), 7)]
     assert sum(pieces[1:], pieces[0]) + stream.advance(int(t[-1]) + 2_000_000) == whole
     assert len(whole) > 20
+
+
+# The shear of three axes
+
+
+def test_shear_is_what_a_loop_over_frames_adds():
+    draw = np.random.default_rng(9)
+    t = np.cumsum(draw.choice([9_000, 12_000, 13_000, 150_000], 300, p=[0.3, 0.4, 0.29, 0.01]))
+    names = [f"{taxel}_{axis}" for taxel in "abc" for axis in "xyz"]
+    array, rest = Array(1, 9, names=names), draw.normal(0.0, 2e4, 9)
+    values = np.float32(rest + np.cumsum(draw.normal(0.0, 40.0, (300, 9)), axis=0))
+    frames = Frames(values[:, None], t, array=array)
+    taken = taxel.Tare.take(Frames(np.float32([[rest], [rest]]), [0, 1000], array=array))
+    mean, above, before, rises, falls = None, 0.0, None, [], []
+    for now, row in zip(t.tolist(), values.astype(np.float64) - taken.rest[0], strict=True):
+        length = math.hypot(row[0::3].sum(), row[1::3].sum())
+        mean = length if mean is None else mean - math.expm1(-(now - before) / 1e5) * above
+        above, before = length - mean, now
+        rises.append(max(above, 0.0))
+        falls.append(max(-above, 0.0))
+    curves = taxel._core.LoadCurve.of_frames(["shear_rise", "shear_fall"], [], 0.0, frames, None, taken.to_json())
+    for curve, loop in zip(curves, (rises, falls), strict=True):
+        times, found = curve.changes()
+        held = found[np.searchsorted(times, t, side="right") - 1]
+        assert held == pytest.approx(loop, rel=1e-4, abs=0.05)
+    with pytest.raises(taxel.ProblemError):
+        taxel._core.LoadCurve.of_frames(["shear_rise"], [], 0.0, press_frames(), None, tare().to_json())
+
+
+def press_frames():
+    return Frames(np.zeros((2, *ARRAY.shape)), [0, 1000], array=ARRAY)
 
 
 # Tuning

@@ -22,9 +22,14 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
 #: The quantities that are changes of a load: each begins where a load begins, ends, or moves.
-CHANGES = ("rise", "fall", "moved", "local_rise", "local_fall")
+CHANGES = ("rise", "fall", "moved", "shear_rise", "shear_fall", "local_rise", "local_fall")
 #: Quantities that are measured together.
-_TOGETHER = (("load_without_largest", "load"), ("rise", "fall", "moved"), ("local_load", "local_rise", "local_fall"))
+_TOGETHER = (
+    ("load_without_largest", "load"),
+    ("rise", "fall", "moved"),
+    ("shear_rise", "shear_fall"),
+    ("local_load", "local_rise", "local_fall"),
+)
 #: Of an example so many frames at least are read for the levels of counts, if it has them; at most twice as many.
 _READ_FRAMES = 5000
 
@@ -110,6 +115,12 @@ class Loads:
     def are_channels(self) -> bool:
         """Whether taxels have no known neighbours."""
         return lacks_neighbours(self._examples)
+
+    @property
+    def have_shear(self) -> bool:
+        """Whether channels are of three axes, as their names say."""
+        arrays = [example.source.array for example in self._examples]  # type: ignore[union-attr]
+        return all({name[-2:] for name in array.names or ("",)} == {"_x", "_y", "_z"} for array in arrays)
 
     @property
     def of_touches(self) -> EdgeRule:

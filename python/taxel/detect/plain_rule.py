@@ -35,7 +35,7 @@ class PlainRule(_Detector):
     Parameters
     ----------
     quantity : {"load", "load_without_largest", "range_load", "count", "area", "begin_area", "moved", "rise", "fall", \
-"local_load", "local_rise", "local_fall", "duration"}
+"shear_rise", "shear_fall", "local_load", "local_rise", "local_fall", "duration"}
         The sum of what taxels read above rest, in the sensor's unit, each loaded alone above the noise floor and six
         times its noise; that without the largest of them, which may be a bad taxel; the sum of what channels read in
         parts of their running ranges (`taxel.encode.RunningRange`), which needs no rest; how many taxels are above a
@@ -44,6 +44,7 @@ class PlainRule(_Detector):
         than a level after it, added up over `levels` in ms: none once it has left the place where it began, as that of
         a foot whose heel lifts; the smaller of what all taxels gain and what they lose against their running means of
         100 ms, as an object that slides; how much the sum of all is above or below its running mean of 100 ms; the
+        same of the length of the shear, the sum as a vector of channels whose names end in _x and _y, above rest; the
         largest sum over 3 x 3 taxels above a rest that follows the sensor, in units of its noise, as of
         `taxel.encode.LocalLoad`, or above ("local_rise") or below ("local_fall") their running means of 50 ms; or how
         long a touch lasts, with the age "end". In single precision.
@@ -246,6 +247,7 @@ class PlainRule(_Detector):
     def _named_quantity(self) -> str:
         """The quantity, with the unit of its level where that is not a number of taxels."""
         units = dict.fromkeys(("load", "load_without_largest", "moved", "rise", "fall"), self.unit)
+        units |= dict.fromkeys(("shear_rise", "shear_fall"), self.unit)
         units |= dict.fromkeys(("local_load", "local_rise", "local_fall"), "units of noise")
         units |= {"range_load": "parts of ranges", "duration": "ms"}
         unit, name = units.get(self.quantity), self.quantity.replace("_", " ")

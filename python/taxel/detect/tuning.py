@@ -450,7 +450,8 @@ def _grid(loads: Loads, parts: Sequence[Stretch], only: str | None) -> Iterator[
 
 def _within_touches(loads: Loads, parts: Sequence[Stretch]) -> Iterator[EdgeRule]:
     """Yield the rules of what happens within touches."""
-    for quantity in ("moved", "rise", "fall") if loads.taxels > 1 else ("rise", "fall"):
+    several, shear = ("moved",) if loads.taxels > 1 else (), ("shear_rise", "shear_fall") if loads.have_shear else ()
+    for quantity in (*several, "rise", "fall", *shear):
         values = loads.values(quantity, parts, touched_ms=SETTLING_MS)
         for level in _levels(quantity, values, loads.noise_floor, 1):
             for release, quiet_ms in product(RELEASES[1::2], QUIETS_WITHIN_MS):
@@ -526,7 +527,7 @@ def _outcomes(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _Out
 
 def _is_onset(onset: _Best, end: _Best) -> bool:
     """Whether a label is that of the begin of a load; a load that falls begins where one ends."""
-    is_fall = onset.rule is not None and onset.rule.quantity in ("fall", "local_fall")
+    is_fall = onset.rule is not None and onset.rule.quantity in ("fall", "shear_fall", "local_fall")
     return abs(onset.fit.constant_ms) < abs(end.fit.constant_ms) and not is_fall
 
 

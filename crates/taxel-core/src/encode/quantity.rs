@@ -10,8 +10,9 @@ use super::level_count::LevelCount;
 use super::load_sum::LoadSum;
 use super::loaded::{Loaded, require_tare};
 use super::local_load::LocalLoad;
-use super::moved::Moved;
+use super::moved::{MEAN_US, Moved};
 use super::range_load::RangeLoad;
+use super::shear::Shear;
 use super::stream::Stream;
 use super::tare::Tare;
 use super::touched::Touched;
@@ -48,6 +49,11 @@ pub enum Quantity {
     Rise,
     /// The same below the running mean.
     Fall,
+    /// How much the length of the shear, the sum of all channels whose names end in _x and _y above rest as a vector, is above
+    /// its running mean of 100 ms.
+    ShearRise,
+    /// The same below the running mean.
+    ShearFall,
     /// The largest sum over 3 x 3 taxels above a tracked rest, in units of its noise, as of [`LocalLoad`](super::LocalLoad):
     /// loads in noise, and above a rest that drifts.
     LocalLoad,
@@ -80,7 +86,11 @@ impl Quantity {
     /// Whether it is measured from running means or ranges, and not from the rest.
     #[must_use]
     pub fn needs_no_floor(self) -> bool {
-        self.is_local() || matches!(self, Self::RangeLoad | Self::Moved | Self::Rise | Self::Fall)
+        self.is_local()
+            || matches!(
+                self,
+                Self::RangeLoad | Self::Moved | Self::Rise | Self::Fall | Self::ShearRise | Self::ShearFall
+            )
     }
 
     /// Whether it counts by levels, which must then be given.
@@ -116,15 +126,20 @@ impl Quantity {
             None => Rest::measured(vec![f64::NO_REST; array.len()]),
             Some(tare) => tare.rest_of(array)?,
         };
+        // What is touched, z says; the rest of the other axes is for shear alone.
+        let whole = tare;
+        let pressed = tare.map(|tare| tare.pressed(array));
+        let tare = pressed.as_ref();
         let loaded = || Loaded::new("plain rule", array, tare, noise_floor);
         // Each feature, with the quantities that its values are.
-        let kinds: [&[Self]; 7] = [
+        let kinds: [&[Self]; 8] = [
             &[Self::Load, Self::LoadWithoutLargest],
             &[Self::RangeLoad],
             &[Self::Count],
             &[Self::Area],
             &[Self::BeginArea],
             &[Self::Moved, Self::Rise, Self::Fall],
+            &[Self::ShearRise, Self::ShearFall],
             &[Self::LocalLoad, Self::LocalRise, Self::LocalFall],
         ];
         let (mut features, mut values) = (vec![], vec![]);
@@ -133,10 +148,14 @@ impl Quantity {
             features.push(match kind[0] {
                 Self::Load => Feature::Load(LoadSum::new(array, require_tare("plain rule", tare)?, noise_floor)?),
                 Self::RangeLoad => Feature::Range(RangeLoad::new(array.len())?),
-                Self::Count => Feature::Count(LevelCount::above_rest(levels, &rest)?),
+                Self::Count => {
+                    let pressed = require_tare("plain rule", tare)?.rest_of(array)?;
+                    Feature::Count(LevelCount::above_rest(levels, &pressed)?)
+                }
                 Self::Area => Feature::Area(loaded()?),
                 Self::BeginArea => Feature::Begin(BeginArea::new(levels, loaded()?, array.len())),
                 Self::Moved => Feature::Moved(Moved::new(array, require_tare("plain rule", tare)?)?),
+                Self::ShearRise => Feature::Shear(Shear::new(array, require_tare("plain rule", whole)?, MEAN_US)?),
                 _ => {
                     let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
                     local.least_noise *= step_of(noise_floor);

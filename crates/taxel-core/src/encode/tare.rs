@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::channels::not_finite;
+use super::shear::axes;
 use crate::held::Held;
 use crate::rest::{FollowedRest, Following, Rest, Value};
 use crate::{Array, EventsView, FramesView, Result, problem, reading};
@@ -94,6 +95,15 @@ impl Tare {
     pub fn followed(&self, array: &Array, following: Following) -> Result<FollowedRest> {
         following.check()?;
         Ok(FollowedRest::new(following, array, self.rest_of(array)?.values(), &self.place_noise()))
+    }
+
+    /// The same tare with no rest of channels of x and y, where taxels have three axes: z says what is touched.
+    pub(super) fn pressed(&self, array: &Array) -> Self {
+        let mut pressed = self.clone();
+        for (rest, axis) in pressed.rest.iter_mut().zip(axes(array)) {
+            *rest = rest.filter(|_| axis == 2);
+        }
+        pressed
     }
 
     /// The noise of each taxel; 0 where it is not known.

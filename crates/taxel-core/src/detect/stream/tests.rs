@@ -62,7 +62,7 @@ fn stream(neuron: &Neuron, latency_ms: f64, period_us: f64) -> ReadoutStream {
     });
     let neurons = DelayedNeurons::new(neurons.collect(), vec![0.0]);
     let way = Way::of_neurons(Box::new(Plain { latency_ms }), neurons);
-    ReadoutStream::new(vec![way], array(), FrameClock::new(period_us).unwrap())
+    ReadoutStream::new(vec![way], array(), FrameClock::new(period_us).unwrap(), None)
 }
 
 /// Events with the stamps of 192 us frames; some frames have many events, some pauses are long.
