@@ -12,6 +12,7 @@ mod afferents;
 mod asynchronous;
 mod commands;
 mod comparator;
+mod counts;
 mod crossed;
 mod flaws;
 mod frame;
@@ -35,6 +36,7 @@ use refresh::Refresh;
 use scan::ScanOrder;
 
 pub use comparator::NOT_RETURNED;
+pub use counts::BoardCounts;
 pub use crossed::Crossed;
 pub use flaws::{Flaw, Flawed, Flaws};
 pub use link::{DATAGRAM_WORDS, PORT, QUEUE_WORDS};
@@ -44,30 +46,9 @@ pub use pattern::pattern;
 pub use play::{Armed, Play, Played};
 pub use session::{opening, session};
 
-use serde::{Deserialize, Serialize};
-
 use crate::wire::v2::Settings;
 use crate::wire::{CommandReader, Registers};
 use crate::{Array, Result, problem};
-
-/// Counts of what the board did and lost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct BoardCounts {
-    /// Number of scanned frames.
-    pub frames: u64,
-    /// Taxels that changed by more than the noise floor.
-    pub changes: u64,
-    /// Number of words that entered the queue; an event of version 2 counts as two.
-    pub words: u64,
-    /// Number of datagrams that the sink accepted.
-    pub datagrams: u64,
-    /// Number of words that the sink accepted.
-    pub sent: u64,
-    /// Number of changes, each with its intensity, and markers that were dropped because the queue was full.
-    pub dropped: u64,
-    /// Number of conversions whose comparator had not returned.
-    pub not_returned: u64,
-}
 
 /// The board: registers, previous values, time and queue.
 ///

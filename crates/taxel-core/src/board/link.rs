@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use super::BoardCounts;
+use super::counts::BoardCounts;
 use crate::wire::v2::{Packer, Settings};
 use crate::wire::{WORD_BYTES, Word};
 use crate::{Array, Result};

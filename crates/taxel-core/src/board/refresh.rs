@@ -1,6 +1,6 @@
 //! Schedules what a board of version 2 repeats: the value of each taxel, a line at a time, and its totals.
 
-use super::BoardCounts;
+use super::counts::BoardCounts;
 use crate::wire::Registers;
 use crate::wire::v2::BoardTotals;
 

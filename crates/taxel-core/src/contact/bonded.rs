@@ -10,6 +10,7 @@ use super::waves::Waves;
 use super::{Foam, pitch_of};
 use crate::{Array, Result, Stop};
 
+mod cell;
 mod descent;
 mod plan;
 mod spread;
@@ -17,22 +18,12 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
+pub use cell::Cell;
 use descent::{Descent, Plane};
 use plan::CellPlane;
 pub use plan::{check_cells, most_cells};
 use spread::PressureSpread;
 use sweep::{Influence, Sweep};
-
-/// A cell that a body may touch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cell {
-    /// Column of the grid.
-    pub x: u32,
-    /// Row of the grid.
-    pub y: u32,
-    /// How far the body has sunk below the face of the layer at rest, mm; below 0 where it is still above.
-    pub sunk_mm: f64,
-}
 
 /// More cells than these, times those along a pitch, are solved by waves: a sweep costs their square, a convolution the
 /// grid whatever is loaded. Up to these, sweeps keep up with the board's rate.

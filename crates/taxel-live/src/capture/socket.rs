@@ -12,8 +12,8 @@ use std::time::Duration;
 #[cfg(target_os = "linux")]
 pub(super) use linux::set;
 
-use super::ReceiverOptions;
 use super::counts::Totals;
+use super::options::ReceiverOptions;
 use super::queue::Batch;
 use super::system_calls::SystemCalls;
 #[cfg(target_os = "linux")]

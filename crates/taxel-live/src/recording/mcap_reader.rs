@@ -5,6 +5,7 @@
 //! an invalid record the walk continues at the next valid chunk; the bytes between are counted.
 
 mod blocks;
+mod message;
 mod remarks;
 mod walk;
 
@@ -24,6 +25,7 @@ use super::{
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
+pub use message::Message;
 pub use remarks::Remarks;
 use remarks::begin_with;
 use walk::FileWalk;
@@ -40,19 +42,6 @@ pub struct Reader {
     rebuilt: Rebuilt,
     /// How many bytes of a source may be in memory at once.
     memory: u64,
-}
-
-/// One message of a file, undecoded.
-#[derive(Debug, Clone, Copy)]
-pub struct Message<'a> {
-    /// Channel of the message.
-    pub topic: Topic,
-    /// Arrival number of a datagram.
-    pub number: u64,
-    /// Time by the host's clock, ns since 1970.
-    pub at_ns: i64,
-    /// Content of the message.
-    pub data: &'a [u8],
 }
 
 /// State between blocks: the file's channels, and the last arrival number.

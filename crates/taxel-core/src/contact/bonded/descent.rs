@@ -1,7 +1,7 @@
 //! Pressures on many cells: conjugate gradients whose influence is a convolution (Polonsky and Keer 1999).
 
 use super::super::waves::Waves;
-use super::Cell;
+use super::cell::Cell;
 use crate::{Result, Stop};
 
 /// The vectors of a solution, whose memory is used again by the next one.

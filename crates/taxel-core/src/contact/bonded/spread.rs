@@ -1,6 +1,6 @@
 //! The part of each cell's pressure that arrives at the taxels below.
 
-use super::Cell;
+use super::cell::Cell;
 use crate::vectors::wide;
 
 /// How a cell's pressure spreads over the taxels below; reach and margin in taxels.

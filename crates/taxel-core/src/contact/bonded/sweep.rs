@@ -1,6 +1,6 @@
 //! Pressures on few cells: projected Gauss-Seidel sweeps with the influence between each two cells.
 
-use super::Cell;
+use super::cell::Cell;
 use crate::vectors::wide;
 use crate::{Result, Stop};
 

@@ -10,8 +10,8 @@ use std::time::Duration;
 use libc::{c_int, c_void};
 
 use super::senders::Senders;
-use crate::capture::ReceiverOptions;
 use crate::capture::counts::Totals;
+use crate::capture::options::ReceiverOptions;
 use crate::capture::queue::Batch;
 use crate::host_clock::Ahead;
 use crate::kernel_drops::KernelDrops;

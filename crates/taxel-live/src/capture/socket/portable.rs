@@ -10,8 +10,8 @@ use mio::{Events, Interest, Poll, Token};
 use socket2::SockRef;
 
 use super::senders::Senders;
-use crate::capture::ReceiverOptions;
 use crate::capture::counts::Totals;
+use crate::capture::options::ReceiverOptions;
 use crate::capture::queue::Batch;
 use crate::kernel_drops::KernelDrops;
 use crate::recording::now_ns;

@@ -11,7 +11,7 @@ use taxel_core::encode::Zeroing;
 use taxel_core::held::UNKNOWN;
 use taxel_core::wire::{self, Registers};
 
-use super::Message;
+use super::message::Message;
 use crate::recording::{BoardChange, BoardChangeKind, Note, RecordingCounts, Topic};
 
 /// All small messages of a recording.
