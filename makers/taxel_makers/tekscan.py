@@ -68,10 +68,11 @@ def read(path: Path, _layout: Layout | None = None) -> list[InMemory]:
             dtype=np.float32,
             skip_blank_lines=False,
         )
+        # A quote that somebody left open joins lines.
+        values = table.to_numpy().reshape(-1, rows, columns)
     except ValueError as error:  # of pandas' parser too
         why = str(error).splitlines()[0]
         raise unreadable(f"a frame has a cell that is no number, or too few: {why}", path) from None
-    values = table.to_numpy().reshape(-1, rows, columns)
     is_missing = np.isnan(values)
     differs = np.flatnonzero((is_missing != is_missing[0]).any(axis=(1, 2)))
     if len(differs):
