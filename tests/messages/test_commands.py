@@ -34,7 +34,7 @@ TYPED = [
     ("record", "--compression", "x", "a.mcap"),
     ("record", "--host", "no such host", "a.mcap"),
     ("record", "--preset", "9 kHz", "a.mcap"),
-    ("record", "there.mcap"),
+    ("record", "--port", "0", "there.mcap"),
     ("record", "--trials", "3", "a.mcap"),
     ("record",),
     ("info",),
