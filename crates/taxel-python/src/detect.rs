@@ -121,6 +121,9 @@ pub fn score(
         .collect())
 }
 
+/// The places of detections and of events.
+type PairsOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
+
 /// The places of detections and of the reference events of one label that are paired, each time ascending, us.
 #[pyfunction]
 pub fn pairs<'py>(
@@ -128,7 +131,7 @@ pub fn pairs<'py>(
     t: PyReadonlyArray1<'py, i64>,
     events: PyReadonlyArray1<'py, i64>,
     window_us: i64,
-) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>)> {
+) -> PyResult<PairsOut<'py>> {
     let (t, events) = (slice("t", &t)?, slice("events", &events)?);
     let found = enter(py, |stop| in_order(t, events, &vec![window_us; events.len()], stop))?;
     let column = |of: fn(&(usize, usize)) -> usize| array(py, found.iter().map(|pair| of(pair) as i64).collect());
