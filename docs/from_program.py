@@ -302,7 +302,7 @@ def described(kind: Any) -> str:  # noqa: PLR0911  a line for each kind
         case msgspec.inspect.IntType(ge=least, le=most):
             return f"whole number, {least} to {most}"
         case msgspec.inspect.FloatType(ge=least, le=most):
-            return f"number, {least:g} to {most:g}"
+            return "number" if least is None else f"number, {least:g} to {most:g}"
         case msgspec.inspect.StrType(min_length=least, max_length=most):
             return f"text, {least} to {most} characters"
         case msgspec.inspect.ListType(item_type=one, min_length=least, max_length=most):
