@@ -6,7 +6,6 @@ it.
 
 from __future__ import annotations
 
-import gzip
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,8 +22,8 @@ from taxel.reading import Facts, InMemory, Marks
 
 __all__ = ["DataSet", "Trial", "data_set", "files", "numbers", "readers", "scored_around", "stances", "table", "trials"]
 
-#: The errors of pandas, NumPy and gzip at a damaged file.
-DAMAGE = (ValueError, KeyError, EOFError, NotImplementedError, gzip.BadGzipFile, zipfile.BadZipFile, zlib.error)
+#: The errors of pandas, NumPy and gzip at a damaged file. OSError: a place that is not in the file, or no gzip.
+DAMAGE = (ValueError, KeyError, EOFError, RuntimeError, OSError, zipfile.BadZipFile, zlib.error)
 #: Detections are scored from this time before the first reference event to this time after the last one, us.
 MARGIN_US = 100_000
 
