@@ -10,7 +10,8 @@ from plain_rules import ARRAY, FLOOR, clocks, events, in_pieces, tare
 import taxel
 from taxel import Frames, Neuron, Readout
 from taxel.detect import Example, Part, PlainRule, Recipe, judge, run, score
-from taxel.detect.fit import Fitter, chosen
+from taxel.detect.choice import chosen
+from taxel.detect.fit import Fitter
 from taxel.detections import Detections
 from taxel.encode import ContactArea, LevelCrossing
 

@@ -89,9 +89,9 @@ def test_a_load_by_running_range_is_what_a_loop_over_frames_adds():
     [curve] = taxel._core.LoadCurve.of_frames(["range_load"], [], 0.0, frames, None, None)
     pairs = zip(t.tolist(), loads, [None, *loads[:-1]], strict=True)
     times, found = (column.tolist() for column in curve.changes())
-    expected_ = [(now, load) for now, load, last in pairs if load != last]
-    assert times == [now for now, _ in expected_]
-    assert found == pytest.approx([load for _, load in expected_], rel=1e-5, abs=1e-5)
+    changes = [(now, load) for now, load, last in pairs if load != last]
+    assert times == [now for now, _ in changes]
+    assert found == pytest.approx([load for _, load in changes], rel=1e-5, abs=1e-5)
     # It needs no tare.
     rule = PlainRule("range_load", 0.8, 0.5, quiet_ms=150.0, date=0.75)
     whole, stream = run(rule, frames, frame_us=100_000.0), rule.stream(frame_us=100_000.0)

@@ -38,7 +38,8 @@ def train(
     """Train neurons to detect labelled events, tune plain rules beside them, and save both as a readout.
 
     Training starts from the recipe that fits the recordings and labels; --recipe, --encoder and --set change that. Of
-    each label runs what makes fewer mistakes beyond chance, else what is known earlier (taxel detect --use: the other).
+    each label runs what makes fewer mistakes beyond chance, else what is known much earlier, else what makes fewer
+    (taxel detect --use: the other).
     The score is cross-validated: each fold is scored by what was made without it. The first line states that, or why
     the score is that of the training data. Exit code 3: no label is detected better than by nothing, and no readout is
     written.

@@ -23,6 +23,7 @@ from taxel.array import Array
 from taxel.detect.ages import in_frames
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.board import noise_floor
+from taxel.detect.choice import chosen
 from taxel.detect.detector import raised
 from taxel.detect.drift import followed, rest_of
 from taxel.detect.examples import Example, array_of, check_examples, frame_ms, name_of, sizes_of, unit_of
@@ -49,8 +50,6 @@ from taxel.wire import FRAME_US
 _FEWER = 3
 #: ... and that share of the labels: of many labels some were never felt.
 _FEWER_SHARE = 0.05
-#: Of how many mistakes a detection is that is far off its label, where neuron and rule are compared.
-_OFF_COST = 0.5
 #: A rule that finds this share of the labels of its training says when they were felt.
 _ALIGNS = 0.95
 _NO_FRAMES = np.empty(0, np.int64)
@@ -118,7 +117,8 @@ def fit(
     Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours). The event is the label,
     or where the recipe aligns labels what the sensor felt of it. Which of neuron and rule is better is found by
     training on each half of the data and detecting in the other: what makes fewer mistakes by more than a standard
-    error over the recordings, else what knows earlier, then what is nearer to the labels.
+    error over the recordings, else what knows earlier by more than a fifth of the window, then what makes fewer, then
+    what is nearer to the labels.
 
     Examples
     --------
@@ -496,72 +496,6 @@ def _known(
         return _core.frame_ends(crossings_ms, FRAME_US if frame_us is None else frame_us, wire_version, _NO_FRAMES)
     known: NDArray[np.int64] = np.rint(to_us(crossings_ms)).astype(np.int64)
     return known
-
-
-class Made(NamedTuple):
-    """What one of neuron and rule made of the labels of a name."""
-
-    mistakes: int
-    """Missed and false."""
-    off: int
-    """How many detections are farther off their label than is right."""
-    known_ms: float
-    """Median time from label to `known`; infinite where nothing was found."""
-    error_ms: float
-    """Median distance of `t` from the label, either way; infinite where nothing was found."""
-
-
-class Choice(NamedTuple):
-    """Which of neuron and rule of a label is better."""
-
-    by_rule: bool
-    by_chance: bool
-    """Whether their mistakes differ by no more than by chance, so that what knows much earlier is better."""
-    off_ms: float
-    """From how far off its label a detection is half a mistake."""
-    neuron: Made
-    rule: Made
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the choice as plain values; what is infinite is None."""
-        made = {
-            way: {name: None if value == np.inf else value for name, value in one._asdict().items()}
-            for way, one in (("neuron", self.neuron), ("rule", self.rule))
-        }
-        return self._asdict() | made
-
-
-def chosen(labels: Sequence[str], off_ms: float, neurons: Sequence[Score], rules: Sequence[Score]) -> dict[str, Choice]:
-    """Return which of neuron and rule detects each label better, by scores in the same parts of recordings.
-
-    Better is what makes fewer mistakes, by more than a standard error of the paired difference over the parts; a
-    detection farther off than `off_ms` is half of one. Where that is not told apart, what knows earlier by more than
-    `off_ms` at the median is better, then what makes fewer, then what is nearer to its label, and last the rule.
-    """
-
-    def joined(scores: Sequence[Score], label: str, what: str) -> NDArray[np.float64]:
-        return np.concatenate([getattr(one.by_label[label], what) for one in scores if label in one.by_label])
-
-    def made(scores: Sequence[Score], label: str) -> tuple[Made, NDArray[np.float64]]:
-        of = [one.by_label.get(label) for one in scores]
-        counts = [(0, 0) if one is None else (one.rank[0], int((np.abs(one.errors_ms) > off_ms).sum())) for one in of]
-        wrong, off = np.array(counts).T
-        known, error = joined(scores, label, "delays_ms"), np.abs(joined(scores, label, "errors_ms"))
-        late = (float(np.median(known)), float(np.median(error))) if len(known) else (np.inf, np.inf)
-        return Made(int(wrong.sum()), int(off.sum()), *late), wrong + _OFF_COST * off
-
-    def choice(label: str) -> Choice:
-        (neuron, its_cost), (rule, cost) = made(neurons, label), made(rules, label)
-        more = cost - its_cost
-        by_chance = abs(more.sum()) <= (np.sqrt(len(more)) * np.std(more, ddof=1) if len(more) > 1 else 0.0)
-        earlier_ms = neuron.known_ms - rule.known_ms
-        if not by_chance or not abs(earlier_ms) > off_ms:
-            better = (more.sum(), rule.error_ms) <= (0.0, neuron.error_ms)
-        else:
-            better = earlier_ms > 0.0
-        return Choice(bool(better), bool(by_chance), off_ms, neuron, rule)
-
-    return {label: choice(label) for label in labels}
 
 
 def _above(recipe: Recipe, noise_floor: float) -> Recipe:

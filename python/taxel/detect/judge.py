@@ -13,8 +13,9 @@ import numpy as np
 from taxel._base.messages import collected
 from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress
+from taxel.detect.choice import Choice, chosen
 from taxel.detect.examples import Example
-from taxel.detect.fit import Choice, Fitter, Found, Rules, Trained, chosen
+from taxel.detect.fit import Fitter, Found, Rules, Trained
 from taxel.detect.folds import Fold, Part, folds_of
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Mistake, Score, mistakes_of, score, score_together

@@ -52,7 +52,7 @@ class RegionLoads:
         if found is None or not len(found[0]):
             raise ProblemError(f"{recording.path.name}: regions need frames of one sensor")
         frames, above, _ = found
-        self.array, self._us = frames.array, us
+        self.array = frames.array
         force = frames._in_n
         self.unit, self.above = frames.unit if force is None else "N", above
         areas = np.ones(self.array.shape) if force is None else np.asarray(self.array.area_mm2) * force
