@@ -13,9 +13,11 @@ from touching import pressed
 import taxel
 from taxel import Array, Frames, ProblemError, Tare
 from taxel._base.messages import collected
+from taxel.demo.script import script
 from taxel.detect import PlainRule
 from taxel.panel.shown_files import Opening, ShownFiles
 from taxel.panel.training import Training
+from taxel.simulate import play
 from taxel.tasks import detect, rest
 
 from .recordings import board, mat, trials
@@ -186,3 +188,19 @@ def test_units_of_force_and_pressure_rest_at_0(tmp_path: Path, unit: str) -> Non
     taxel.convert(Frames(np.full((100, 1, 2), 5.0), 10_000 * np.arange(100), unit=unit), tmp_path / "a.npz")
     taken = rest(taxel.open(tmp_path / "a.npz"))
     assert (taken.source, taken.tare.rest.any()) == ("unit", np.False_)
+
+
+def test_a_board_shows_its_rest_until_it_is_started(tmp_path: Path) -> None:
+    """After that it holds values that are off by up to its noise floor; these count where taxels were silent before."""
+    events = play(script(7, 1), seed=7).events
+    start = events.markers[0][0]
+    last = np.flatnonzero(events.t > start)[-1]
+    is_one = (events.x == events.x[last]) & (events.y == events.y[last])
+    for name, source, end in (
+        ("whole.npz", events, start),
+        ("silent.npz", events[~is_one | (events.t > start)], events.t[0] + 500_000),
+    ):
+        taxel.convert(source, tmp_path / name)
+        taken = rest(taxel.open(tmp_path / name))
+        assert (taken.source, taken.us) == ("quiet", (events.t[0], end))
+        assert np.array_equal(taken.tare.rest, Tare.take(source, stop_us=end).rest, equal_nan=True)

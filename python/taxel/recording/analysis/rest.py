@@ -149,7 +149,8 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> Rest:
     """Return the rest of a recording's taxels, for each task, on the page, in shell and Python.
 
     It is the given one; else 0 of frames in a unit of force or pressure; else that of the first quiet stretch of half
-    a second in which nothing is on the array, for a board's events on their held values; else unknown.
+    a second in which nothing is on the array, for a board's events on their held values, or on what all taxels read
+    until the board's start, if it is in there; else unknown.
 
     Parameters
     ----------
@@ -211,13 +212,23 @@ def of_frames(frames: Frames) -> Rest:
 
 def _of_events(recording: Recording) -> Rest:
     """Return the rest of a board's taxels that a quiet stretch of what they hold shows, or none."""
-    present = recording.events.present
-    if present is None or not present.any():
+    events = recording.events
+    if events.present is None or not events.present.any():
         return Rest("none")
     read = Readings.of_events(recording)
     if (found := read.in_quiet()) is None:
         return Rest("none")
-    return _unloaded(_measured(recording, found[0][1], found[0][0]), read, found[1])
+    begin, end = found[0]
+    # Until its start a board sends all that its taxels read, and then only changes beyond its noise floor.
+    marked = min((t for t, starts in events.markers if starts and begin < t < end), default=end)
+    if _taxels(events.between(begin, marked)) == _taxels(events):
+        end = marked
+    return _unloaded(_measured(recording, end, begin), read, found[1])
+
+
+def _taxels(events: Events) -> int:
+    """Return how many taxels have events."""
+    return len(np.unique(events.y.astype(np.int64) * events.array.columns + events.x))
 
 
 def _unloaded(tare: Tare, read: Readings, begins: NDArray[np.float64]) -> Rest:
