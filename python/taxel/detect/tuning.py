@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from taxel.detect import recipes
 from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks, within
 from taxel.detect.plain_rule import PlainRule
-from taxel.detect.scoring import many, tally
+from taxel.detect.scoring import APART_US, many, tally
 from taxel.spikes import SpikeTrains, to_us
 
 #: Levels of a quantity are so many quantiles of it where it is loaded, which tell weak loads apart, and so many
@@ -174,25 +174,26 @@ def tune(
 
 
 class _Outcomes(NamedTuple):
-    """What a rule made of the labels of one name."""
+    """What rules made of the labels of one name, a row each of those that are better than to detect nothing."""
 
+    rules: list[EdgeRule]
     error_ms: NDArray[np.float32]
     """How far the detection of each label is from it, later is positive; NaN of one that is missed."""
     delay_ms: NDArray[np.float32]
     """How far `known` is from it; likewise."""
     false: NDArray[np.int64]
-    """The false detections, us on the one clock."""
-
-
-class _Table(NamedTuple):
-    """What several rules made of the labels of one name, as rows of their outcomes."""
-
-    rules: Sequence[EdgeRule]
-    error_ms: NDArray[np.float32]
-    delay_ms: NDArray[np.float32]
-    false: NDArray[np.int64]
-    """The false detections of all, us, and of which rule each is."""
+    """The false detections of all, us on the one clock, and of which row each is."""
     of: NDArray[np.int64]
+
+    @classmethod
+    def joined(cls, each: Sequence[Self]) -> Self:
+        """Return those of several as one."""
+        first = np.cumsum([0, *(len(one.rules) for one in each)])
+        of = [one.of + row for one, row in zip(each, first[:-1], strict=True)]
+        errors, delays, false, rows = (
+            np.concatenate(column) for column in (*zip(*(one[1:4] for one in each), strict=True), of)
+        )
+        return cls([rule for one in each for rule in one.rules], errors, delays, false, rows)
 
 
 class Tuning:
@@ -214,7 +215,9 @@ class Tuning:
         self.off_ms = max(OFF * window_ms, loads.frame_ms)
         self._truth = {name: loads.truth(name, loads.whole_examples) for name in names}
         self._windows = loads.windows(loads.whole_examples)
-        self._tried: dict[EdgeRule, dict[tuple[str, int], _Outcomes]] = {}
+        self._tried: set[EdgeRule] = set()
+        #: Of a label at the begins and at the ends of loads.
+        self._outcomes: dict[tuple[str, int], _Outcomes] = {}
 
     def best_rules(self, parts: Sequence[Stretch], only: str | None = None) -> dict[str, PlainRule | None]:
         """Return for each label the best rule on parts of the examples, as `tune` does on all of them.
@@ -250,7 +253,7 @@ class Tuning:
         labels = int(np.count_nonzero(within(self._truth[name], windows)))
         # A change of the load begins where the load begins or ends; it ends as it is forgotten.
         possible = [rule for rule in grid if edge == 0 or rule.quantity not in CHANGES]
-        best = self._equal(self._fits(name, windows, self._table(name, edge, possible)), labels)
+        best = self._equal(self._fits(name, edge, windows, possible), labels)
         if best is None:
             return _Best(_NONE, None)
         rule, fit = best
@@ -258,23 +261,19 @@ class Tuning:
         how: dict[str, Any] = {"labels": names, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
         return _Best(fit, PlainRule(**rule._asdict(), constant_ms=float(f"{fit.constant_ms:.3g}"), **how))
 
-    def _table(self, name: str, edge: int, rules: Iterable[EdgeRule]) -> _Table | None:
-        """Return what rules make of a label in all examples, of those better than nothing; None without any."""
-        found = {rule: one for rule in rules if (one := self._found(rule).get((name, edge))) is not None}
-        if not (each := list(found.values())):
-            return None
-        columns = (np.stack([one.error_ms for one in each]), np.stack([one.delay_ms for one in each]))
-        of = np.repeat(np.arange(len(each)), [len(one.false) for one in each])
-        return _Table(list(found), *columns, np.concatenate([one.false for one in each]), of)
-
-    def _fits(self, name: str, windows: NDArray[np.int64], table: _Table | None) -> list[tuple[EdgeRule, _RuleFit]]:
+    def _fits(
+        self, name: str, edge: int, windows: NDArray[np.int64], rules: Sequence[EdgeRule]
+    ) -> list[tuple[EdgeRule, _RuleFit]]:
         """Return how rules do in windows, of those that may be equal to the best, and are not known too late."""
+        self._try([rule for rule in rules if rule not in self._tried])
         fits: list[tuple[EdgeRule, _RuleFit]] = []
-        if table is None:
+        if (outcomes := self._outcomes.get((name, edge))) is None:
             return fits
-        inside = within(self._truth[name], windows)
-        false = np.bincount(table.of[within(table.false, windows)], minlength=len(table.rules))
-        errors, delays = table.error_ms[:, inside], table.delay_ms[:, inside]
+        place = {rule: row for row, rule in enumerate(outcomes.rules)}
+        tried = np.array([place[rule] for rule in rules if rule in place], np.int64)
+        inside = np.ix_(tried, np.flatnonzero(within(self._truth[name], windows)))
+        false = np.bincount(outcomes.of[within(outcomes.false, windows)], minlength=len(outcomes.rules))[tried]
+        errors, delays = outcomes.error_ms[inside], outcomes.delay_ms[inside]
         least = np.isnan(errors).sum(axis=1) + false
         order, most = np.argsort(least, kind="stable"), np.inf
         for k in range(0, len(order), _ROWS):
@@ -283,7 +282,7 @@ class Tuning:
                 break
             for row, fit in zip(rows.tolist(), self._of_rows(errors[rows], delays[rows], false[rows]), strict=True):
                 if fit.delay_ms <= self._window_ms + self.loads.frame_ms:
-                    fits.append((table.rules[row], fit))
+                    fits.append((outcomes.rules[tried[row]], fit))
                     most = min(most, fit.cost + fit.room(errors.shape[1]))
         return fits
 
@@ -323,17 +322,48 @@ class Tuning:
         columns = (column.tolist() for column in (wrong, off, constants_ms, known_ms))
         return map(_RuleFit, *columns)
 
-    def _found(self, rule: EdgeRule) -> dict[tuple[str, int], _Outcomes]:
-        """Return what a rule makes of each label at either edge; none where that is no better than nothing."""
-        if rule not in self._tried:
-            self._tried[rule] = {}
-            for edge, edges in enumerate(self.loads.edges(rule)):
-                found = edges.between(self._windows)
-                for name, true in self._truth.items():
-                    outcomes = _outcomes(found, true, self._width_us)
-                    if outcomes is not None:
-                        self._tried[rule][name, edge] = outcomes
-        return self._tried[rule]
+    def _try(self, rules: Sequence[EdgeRule]) -> None:
+        """Keep what rules make of each label at either edge, some of them at once."""
+        self._tried.update(rules)
+        made: dict[tuple[str, int], list[_Outcomes]] = {}
+        for k in range(0, len(rules), _ROWS):
+            some = rules[k : k + _ROWS]
+            each = [[edges.between(self._windows) for edges in self.loads.edges(rule)] for rule in some]
+            for edge, (name, true) in product((0, 1), self._truth.items()):
+                outcomes = self._made(some, [pair[edge] for pair in each], true)
+                if outcomes is not None:
+                    made.setdefault((name, edge), []).append(outcomes)
+        for key, of_key in made.items():
+            self._outcomes[key] = _Outcomes.joined([*filter(None, [self._outcomes.get(key)]), *of_key])
+
+    def _made(
+        self, rules: Sequence[EdgeRule], found: Sequence[FoundTimes], true: NDArray[np.int64]
+    ) -> _Outcomes | None:
+        """Return what rules make of labels by what each finds; None where none is better than to find nothing.
+
+        Left out are those that find half as many more or fewer. Rules are one after the other on one clock, as the
+        examples of each are.
+        """
+        sound = [k for k, one in enumerate(found) if 2 * abs(len(one.t) - len(true)) < len(true)]
+        if not sound:
+            return None
+        of = np.repeat(np.arange(len(sound)), [len(found[k].t) for k in sound])
+        t, known = (np.concatenate([getattr(found[k], name) for k in sound]) for name in ("t", "known"))
+        begins = np.arange(len(sound)) * (len(self.loads.whole_examples) + 1) * APART_US
+        pairs = tally(t + begins[of], known + begins[of], (true + begins[:, None]).ravel(), self._width_us)
+        assert pairs is not None
+        is_false = np.ones(len(t), np.bool_)
+        is_false[pairs.detected] = False
+        errors, delays = np.full((2, len(sound) * len(true)), np.nan, np.float32)
+        errors[pairs.events], delays[pairs.events] = pairs.errors_ms, pairs.delays_ms
+        errors, delays = errors.reshape(len(sound), -1), delays.reshape(len(sound), -1)
+        wrong = np.isnan(errors).sum(axis=1) + np.bincount(of[is_false], minlength=len(sound))
+        better = np.flatnonzero(wrong < len(true))
+        place = np.full(len(sound), -1)
+        place[better] = np.arange(len(better))
+        is_false &= place[of] >= 0
+        kept = [rules[sound[row]] for row in better]
+        return _Outcomes(kept, errors[better], delays[better], t[is_false], place[of[is_false]]) if kept else None
 
     def detected(self, rule: PlainRule | None, label: str, part: Stretch) -> FoundTimes:
         """Return what the rule of a label detects of it in a part of an example, as `taxel.detect.run` finds it."""
@@ -379,10 +409,10 @@ class Tuning:
             fits = {}
             for name, is_kind in ((below, areas < level), (above, areas >= level)):
                 of_kind = FoundTimes(t[is_kind], known[is_kind], areas[is_kind])
-                one = _outcomes(of_kind, truth[name], self._width_us)
+                one = self._made([EdgeRule("area", level)], [of_kind], truth[name])
                 fits[name] = _NONE
                 if one is not None:
-                    [fits[name]] = self._of_rows(one.error_ms[None], one.delay_ms[None], np.array([len(one.false)]))
+                    [fits[name]] = self._of_rows(one.error_ms, one.delay_ms, np.array([len(one.false)]))
             quantity = "duration" if age == "end" else "area"
             how: dict[str, Any] = {"noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
             rule = PlainRule(quantity, level, age_ms=age, labels=(below, above), **how)
@@ -493,19 +523,6 @@ def _snapped(levels: NDArray[np.float64]) -> set[float]:
 def _rank(rule: EdgeRule | PlainRule | None) -> int:
     """Return the place of a rule where others are equal."""
     return next((k for k, names in enumerate(FIRST) if rule is not None and rule.quantity in names), len(FIRST))
-
-
-def _outcomes(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _Outcomes | None:
-    """Return what detections make of labels; None where they are no better than none, or half as many more or fewer."""
-    if not len(true) or 2 * abs(len(found.t) - len(true)) >= len(true):
-        return None
-    pairs = tally(found.t, found.known, true, width_us)
-    assert pairs is not None
-    if pairs.wrong >= len(true):
-        return None
-    errors, delays = np.full((2, len(true)), np.nan, np.float32)
-    errors[pairs.events], delays[pairs.events] = pairs.errors_ms, pairs.delays_ms
-    return _Outcomes(errors, delays, np.delete(found.t, pairs.detected))
 
 
 def _is_onset(onset: _Best, end: _Best) -> bool:
