@@ -313,7 +313,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "Recipe.load.recipe": lambda: "here.toml",
     "Registers.commands_to.target": lambda: REGISTERS,
     "SceneFile.open.path": lambda: "here_scene.toml",
-    "SpikeTrains.from_neo.trains": TRAINS.to_neo,
     "SpikeTrains.load.path": lambda: "here.npz",
     "SpikeTrains.select.trains": lambda: [1],
     "Tare.load.path": lambda: "here_tare.json",

@@ -1,6 +1,7 @@
 """Touch as events: from the bytes of a tactile array to detections with the time of each."""
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from taxel._base.drawing import draw_by
@@ -100,17 +101,8 @@ __all__ = [
 ]
 
 
-#: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
-_ROOMS = (
-    "board_check", "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "panel", "plot",
-    "reading", "recording", "report", "simulate", "tasks", "wire",
-)  # fmt: skip
-_RECORDING = (
-    "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",
-    "open_all",
-)  # fmt: skip
-_ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
-_ELSEWHERE |= {
+#: Where those names of a package are that are not loaded yet and have not the same name in `taxel.recording`.
+_ELSEWHERE = {
     "open": ("taxel.recording", "open_one"), "Readout": ("taxel.detect", "Readout"), "train": ("taxel.tasks", "train")
 }  # fmt: skip
 
@@ -120,13 +112,13 @@ draw_by(lambda: import_module("taxel.plot"))
 
 
 def __getattr__(name: str) -> Any:
-    """Import a subpackage, or a name from one, at its first access."""
+    """Import a subpackage, or a name from one, at its first access, so that ``import taxel`` is quick."""
     if name == "__version__":
         return import_module("importlib.metadata").version("taxel")
-    if name in _ROOMS:
+    if find_spec(f"taxel.{name}") is not None:
         return import_module(f"taxel.{name}")
-    if name in _ELSEWHERE:
-        module, inside = _ELSEWHERE[name]
+    if name in __all__:
+        module, inside = _ELSEWHERE.get(name, ("taxel.recording", name))
         value = getattr(import_module(module), inside)
         globals()[name] = value
         return value

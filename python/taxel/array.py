@@ -425,12 +425,8 @@ class Array:
         known = self._is_measured and array._is_measured
         if not known or (self.pitch_mm, self.places) == (array.pitch_mm, array.places):
             return False
-        spacing, spacing_of_array = self._apart(), array._apart()
-        if spacing != spacing_of_array:
-            differ = f"{array.name} has taxels {spacing_of_array}, but {self.name} has taxels {spacing}"
-        elif array.name == self.name:
-            differ = f"two sensors named {self.name} have their taxels at different places"
-        else:
+        differ = f"{array.name} has taxels {array._apart()}, but {self.name} has taxels {self._apart()}"
+        if self._apart() == array._apart():
             differ = f"{array.name} and {self.name} have their taxels at different places"
         warn(f"{subject}: {differ}", stacklevel=stacklevel + 1)
         return True

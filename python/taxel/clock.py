@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import shown
-from taxel._base.errors import refused
+from taxel._base.arguments import numbers
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 
@@ -120,7 +119,7 @@ class Clock:
         >>> Clock(np.array([0, 1000]), np.array([10**15, 10**15 + 10**6])).host_ns([500])
         array([1000000000500000])
         """
-        t = _whole("board_us", board_us, "us")
+        t = numbers("board_us", board_us, np.int64, "us")
         board, host = self._knots
         k = np.clip(np.searchsorted(board, t, side="right") - 1, 0, len(board) - 2)
         since = t - board[k]
@@ -149,7 +148,7 @@ class Clock:
         >>> Clock(np.array([0, 1000]), np.array([10**15, 10**15 + 10**6])).board_us_at([10**15 + 500_000])
         array([500])
         """
-        target = _whole("host_ns", host_ns, "ns")
+        target = numbers("host_ns", host_ns, np.int64, "ns")
         board, host = self._knots
         t = board[0] + (target - host[0]) // 1000
         for _ in range(4):
@@ -187,17 +186,6 @@ class Clock:
             else f"{counted(count, 'datagram')}, too few for a drift"
         )
         return f"Clock({drift}, delays {late[0]:.0f} us median, {late[1]:.0f} us 99 %)"
-
-
-def _whole(name: str, values: Any, unit: str) -> NDArray[np.int64]:
-    """Return one time or several as int64; refuse values that are not whole numbers."""
-    try:
-        times = np.asarray(values)
-    except (ValueError, TypeError, OverflowError):
-        times = np.array(None)
-    if times.size and (times.dtype.kind not in "iu" or times.max() > np.iinfo(np.int64).max):
-        raise refused(name, f" is {shown(values)}: must be whole {unit}")
-    return times.astype(np.int64)
 
 
 def _at(line: _core._ClockLine, own_us: int) -> int:

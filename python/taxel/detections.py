@@ -8,7 +8,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -112,6 +112,8 @@ class Detections(FrozenColumns):
     >>> len(found.between(0, 5000))
     1
     """
+
+    _COMPARED: ClassVar[tuple[str, ...]] = ("label", "t", "known", "slope", "reported", "repaired")
 
     def __init__(
         self,
@@ -241,16 +243,8 @@ class Detections(FrozenColumns):
 
     def to_numpy(self) -> NDArray[np.void]:
         """Return a record for each detection: ``label t known slope``; ``reported`` if known, ``repaired`` if any."""
-        width = max(1, self.label.dtype.itemsize // 4)
-        fields: list[tuple[str, Any]] = [("label", f"U{width}"), ("t", "<i8"), ("known", "<i8"), ("slope", "<f8")]
-        if self.reported is not None:
-            fields.append(("reported", "<i8"))
-        if self.repaired.any():
-            fields.append((_REPAIRED, "?"))
-        records = np.empty(len(self), np.dtype(fields))
-        for name, _ in fields:
-            records[name] = getattr(self, name)
-        return records
+        reported = ["reported"] * (self.reported is not None)
+        return self._records(["label", "t", "known", "slope", *reported, *[_REPAIRED] * bool(self.repaired.any())])
 
     @classmethod
     def from_list(cls, detections: Iterable[Detection]) -> Detections:
@@ -362,17 +356,6 @@ class Detections(FrozenColumns):
         label, *columns = parts
         t, known, slope, repaired = map(frozen, columns)
         return cls._of(label, t, known, slope, repaired=repaired)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Detections):
-            return NotImplemented
-        if (self.reported is None) != (other.reported is None):
-            return False
-        names = ["label", "t", "known", "repaired"] + ([] if self.reported is None else ["reported"])
-        same = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
-        return same and np.array_equal(self.slope, other.slope, equal_nan=True)
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         if not len(self):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,13 @@ from taxel.array import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Events", "repaired_of"]
+__all__ = ["Events"]
+
+#: The columns and their types; the last three are None where no event has them.
+_COLUMNS: dict[str, type[np.generic]] = {
+    "t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.bool_, "intensity": np.uint16, "present": np.bool_,
+    "repaired": np.bool_,
+}  # fmt: skip
 
 
 class Event(NamedTuple):
@@ -90,6 +96,8 @@ class Events(FrozenColumns):
     Event(t=0, x=3, y=5, p=True, intensity=None, repaired=False)
     """
 
+    _COMPARED: ClassVar[tuple[str, ...]] = ("array", "markers", *_COLUMNS)
+
     def __init__(
         self,
         t: ArrayLike,
@@ -119,7 +127,7 @@ class Events(FrozenColumns):
                 self.intensity = frozen(np.where(self.present, self.intensity, np.uint16(0)))
         elif present is not None:
             raise ProblemError("present is given without intensity: give both or neither")
-        self.repaired = None if repaired is None else _where_any(frozen_column("repaired", repaired, np.bool_))
+        self.repaired = _where_any(None if repaired is None else frozen_column("repaired", repaired, np.bool_))
         self.markers = _markers(markers)
         _core.check_events(self)
 
@@ -187,13 +195,11 @@ class Events(FrozenColumns):
         return ordered
 
     def __iter__(self) -> Iterator[Event]:
-        ticks: list[int | None] = [None] * len(self)
-        if self.intensity is not None and self.present is not None:
-            pairs = zip(self.intensity.tolist(), self.present.tolist(), strict=True)
-            ticks = [value if there else None for value, there in pairs]
-        columns = (self.t, self.x, self.y, self.p)
-        repaired = [False] * len(self) if self.repaired is None else self.repaired.tolist()
-        return map(Event, *(column.tolist() for column in columns), ticks, repaired)
+        ticks = np.full(len(self), None)
+        if self.intensity is not None:
+            ticks[self.present] = self.intensity[self.present]
+        repaired = np.zeros(len(self), np.bool_) if self.repaired is None else self.repaired
+        return map(Event, *(column.tolist() for column in (self.t, self.x, self.y, self.p, ticks, repaired)))
 
     @overload
     def __getitem__(self, chosen: int) -> Event: ...
@@ -214,13 +220,10 @@ class Events(FrozenColumns):
             if isinstance(indices, slice) and indices.step not in (None, 1):
                 # The compiled part reads contiguous columns.
                 indices = np.arange(len(self))[indices]
-            t = self.t[indices]
+            columns = {name: column[indices] for name, column in self._columns.items()}
         except (TypeError, ValueError) as error:
             raise refused("events", f"[{shown(chosen)}]: {error}") from None
-        columns: list[Any] = [self.intensity, self.present, self.repaired]
-        ticks, present, repaired = (None if column is None else column[indices] for column in columns)
-        x, y, p, markers = self.x[indices], self.y[indices], self.p[indices], self._markers_of(indices)
-        return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, markers)
+        return self._unchecked(self.array, self._markers_of(indices), **columns)
 
     def _markers_of(self, indices: slice | NDArray[Any]) -> tuple[tuple[int, bool], ...]:
         """Return the markers of the time of chosen events."""
@@ -249,30 +252,24 @@ class Events(FrozenColumns):
             raise ProblemError(
                 f"events of {self.array!r} and of {other.array!r}: only events of one array can be merged"
             )
-        return self._joined((self, other))
+        return self._joined((self, other)).sorted()
 
     @classmethod
     def _joined(cls, tables: Sequence[Events]) -> Events:
-        """Return the events and markers of tables of one array in order of time, at equal times in their order."""
-        ticks = present = None
-        if any(table.intensity is not None for table in tables):
-            none = [np.zeros(len(e), np.uint16) for e in tables]
-            ticks = np.concatenate(
-                [z if e.intensity is None else e.intensity for e, z in zip(tables, none, strict=True)]
-            )
-            present = np.concatenate(
-                [z > 0 if e.present is None else e.present for e, z in zip(tables, none, strict=True)]
-            )
-        t, x, y, p = (np.concatenate([getattr(e, name) for e in tables]) for name in ("t", "x", "y", "p"))
-        markers = tuple(marker for table in tables for marker in table.markers)
-        return cls._unchecked(t, x, y, p, tables[0].array, ticks, present, repaired_of(tables), markers).sorted()
+        """Return the events and markers of tables of one array, those of the first before those of the next."""
+        each = [table._columns for table in tables]
+        columns = {
+            name: np.concatenate([one.get(name, np.zeros(len(one["t"]), _COLUMNS[name])) for one in each])
+            for name in dict.fromkeys(name for one in each for name in one)
+        }
+        markers = [marker for table in tables for marker in table.markers]
+        return cls._unchecked(tables[0].array, markers, **columns)
 
     def _moved(self, times: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> Events:
         """Return the same events and markers by another clock."""
         at = times(np.array([t for t, _ in self.markers], np.int64)).tolist()
         markers = tuple(zip(at, (start for _, start in self.markers), strict=True))
-        columns = (self.x, self.y, self.p, self.array, self.intensity, self.present, self.repaired)
-        return self._unchecked(times(self.t), *columns, markers)
+        return self._unchecked(self.array, markers, **self._columns | {"t": times(self.t)})
 
     def _on(self, array: Array) -> Events:
         """Return the same events on another description of their sensor."""
@@ -284,20 +281,12 @@ class Events(FrozenColumns):
         """Return the events of a rectangle of columns `x` and rows `y` as those of a smaller array."""
         (left, _), (top, _) = self.array.region(x, y)
         inside = self.region(x, y)
-        columns = (inside.x - np.uint16(left), inside.y - np.uint16(top), inside.p, self.array._part(x, y))
-        return self._unchecked(inside.t, *columns, inside.intensity, inside.present, inside.repaired, self.markers)
+        places = {"x": inside.x - np.uint16(left), "y": inside.y - np.uint16(top)}
+        return self._unchecked(self.array._part(x, y), self.markers, **inside._columns | places)
 
     def to_numpy(self) -> NDArray[np.void]:
         """Return a record for each event: ``t x y p``, with ``intensity present`` and ``repaired`` if there are any."""
-        fields: list[tuple[str, Any]] = [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")]
-        if self.intensity is not None:
-            fields += [("intensity", "<u2"), ("present", "?")]
-        if self.repaired is not None:
-            fields.append(("repaired", "?"))
-        records = np.empty(len(self), np.dtype(fields))
-        for name, _ in fields:
-            records[name] = getattr(self, name)
-        return records
+        return self._records(self._columns)
 
     @classmethod
     def from_numpy(cls, records: NDArray[np.void], array: Array) -> Events:
@@ -326,40 +315,21 @@ class Events(FrozenColumns):
         """Draw the number of events of each taxel: rises in one colour, falls in another."""
         return draw("event_picture", self, ax)  # type: ignore[no-any-return]
 
+    @property
+    def _columns(self) -> dict[str, NDArray[Any]]:
+        """The columns by name, without those that no event has."""
+        return {name: column for name in _COLUMNS if (column := getattr(self, name)) is not None}
+
     @classmethod
-    def _unchecked(
-        cls,
-        t: NDArray[np.int64],
-        x: NDArray[np.uint16],
-        y: NDArray[np.uint16],
-        p: NDArray[np.bool_],
-        array: Array,
-        intensity: NDArray[np.uint16] | None,
-        present: NDArray[np.bool_] | None,
-        repaired: NDArray[np.bool_] | None,
-        markers: Sequence[tuple[int, bool]],
-    ) -> Events:
+    def _unchecked(cls, array: Array, markers: Sequence[tuple[int, bool]], **columns: NDArray[Any] | None) -> Events:
         """Build events from columns that the compiled part or another `Events` has already checked."""
         events = cls.__new__(cls)
         events.array, events.markers = array, tuple(markers)
-        events.t, events.x, events.y, events.p = frozen(t), frozen(x), frozen(y), frozen(p)
-        events.intensity = None if intensity is None else frozen(intensity)
-        events.present = None if present is None else frozen(present)
-        events.repaired = None if repaired is None else _where_any(frozen(repaired))
+        for name in _COLUMNS:
+            column = columns.get(name)
+            setattr(events, name, None if column is None else frozen(column))
+        events.repaired = _where_any(events.repaired)
         return events
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Events):
-            return NotImplemented
-        if self.array != other.array or self.markers != other.markers:
-            return False
-        if (self.intensity is None, self.repaired is None) != (other.intensity is None, other.repaired is None):
-            return False
-        names = ["t", "x", "y", "p"] + ([] if self.intensity is None else ["intensity", "present"])
-        names += [] if self.repaired is None else ["repaired"]
-        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         time = f"{int(self.t.min())} to {int(self.t.max())} us" if len(self) else "no time"
@@ -383,14 +353,6 @@ def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...
     return tuple(zip(t.tolist(), starts.tolist(), strict=True))
 
 
-def _where_any(repaired: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+def _where_any(repaired: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
     """Return the mask, or None if it marks no event, so that equal events have equal columns."""
-    return repaired if repaired.any() else None
-
-
-def repaired_of(tables: Sequence[Events]) -> NDArray[np.bool_] | None:
-    """Return the mask of repaired events of concatenated tables; None if no event is repaired."""
-    if all(table.repaired is None for table in tables):
-        return None
-    none = (np.zeros(len(table), np.bool_) for table in tables)
-    return np.concatenate([z if e.repaired is None else e.repaired for e, z in zip(tables, none, strict=True)])
+    return None if repaired is None or not repaired.any() else repaired

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +61,8 @@ class Frames(FrozenColumns):
     >>> frames
     Frames(3 frames of 8 x 8 taxels, 0 to 384 us, ticks)
     """
+
+    _COMPARED: ClassVar[tuple[str, ...]] = ("array", "unit", "t", "values")
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
         self.values: NDArray[np.float32] = frozen_numbers("values", values, np.float32)
@@ -256,11 +258,8 @@ class Frames(FrozenColumns):
             "area_taxels" if areas is None else "area_mm2": there,
         }
         if array.centre_unit is not None:
-            total = weights.sum(axis=(1, 2))
-            for name, place in zip("xy", array.positions(), strict=True):
-                moment = np.einsum("nij,ij->n", weights, place[rows, columns])
-                centre = np.divide(moment, total, out=np.full(len(self), np.nan), where=total > 0)
-                found[f"centre_{name}_{array.centre_unit}"] = centre
+            centre = _centre(weights, np.stack(array.positions())[:, rows, columns])
+            found |= {f"centre_{name}_{array.centre_unit}": centre[:, k] for k, name in enumerate("xy")}
         if range_end is not None:
             at_end = (values >= finite("range_end", range_end)) & inside
             found["at_range_end_taxels"] = np.count_nonzero(at_end, axis=(1, 2)).astype(np.float64)
@@ -420,8 +419,6 @@ class Frames(FrozenColumns):
             raise ProblemError(
                 f"area needs mm2, but the area of a taxel of {self.array!r} is not known; loaded() counts taxels"
             )
-        if self.array.places is None:
-            return np.asarray(areas.flat[0] * self.loaded(above))
         return np.asarray(np.where(self._loaded(above), areas, 0.0).sum(axis=(1, 2)))
 
     def loaded(self, above: float = 0.0) -> NDArray[np.int64]:
@@ -482,17 +479,7 @@ class Frames(FrozenColumns):
         if finite("above", above) < 0:
             raise refused("above", f" is {shown(above)}: must be 0 or more, because values are weights")
         weights = np.where(self._loaded(above), self.values, 0.0)
-        across, down = weights.sum(axis=1, dtype=np.float64), weights.sum(axis=2, dtype=np.float64)
-        if self.array.places is None:
-            pitch = self.array._pitch("centre") if self.array.pitch_mm is not None else (1.0, 1.0)
-            moments = np.stack([across @ np.arange(self.array.columns), down @ np.arange(self.array.rows)], axis=1)
-            moments = moments * pitch[::-1]
-        else:
-            moments = np.einsum("nij,kij->nk", weights, np.stack(self.array.positions()), dtype=np.float64)
-        total = across.sum(axis=1)[:, None]
-        centre = np.full(moments.shape, np.nan)
-        np.divide(moments, total, out=centre, where=total > 0)
-        return centre
+        return _centre(weights, np.stack(self.array.positions()))
 
     def _above(self, rest: NDArray[np.float64]) -> Frames:
         """Return the frames above the rest of each taxel; an unknown rest is infinite."""
@@ -523,29 +510,21 @@ class Frames(FrozenColumns):
         columns = [name or f"x{column}y{row}" for name, column, row in zip(names[y, x], x, y, strict=True)]
         return pd.DataFrame(self.values[:, y, x], pd.Index(self.t, name="t_us"), columns)
 
-    def to_numpy(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-        """Return values (n, rows, columns) and times (us)."""
-        return self.values.copy(), self.t.copy()
-
     def plot(self, at: int | None = None, ax: Axes | None = None) -> Axes:
         """Draw the pressure map at `at` us, or of the frame with the largest sum."""
         return draw("pressure_map", self, at, ax)  # type: ignore[no-any-return]
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Frames):
-            return NotImplemented
-        return (
-            (self.array, self.unit) == (other.array, other.unit)
-            and np.array_equal(self.t, other.t)
-            and np.array_equal(self.values, other.values, equal_nan=True)
-        )
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
         size = f"{self.array.rows} x {self.array.columns} taxels"
         return escaped(f"Frames({counted(len(self), 'frame')} of {size}, {time}, {self.unit})")
+
+
+def _centre(weights: NDArray[np.floating], positions: Values) -> Values:
+    """Return the centre of the weights of each frame, shape (n, 2); NaN without any."""
+    total = weights.sum(axis=(1, 2), dtype=np.float64)[:, None]
+    moments = np.einsum("nij,kij->nk", weights, positions, dtype=np.float64)
+    return np.asarray(np.divide(moments, total, out=np.full(moments.shape, np.nan), where=total > 0))
 
 
 def _refuse_infinite(name: str, values: NDArray[np.float32]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from taxel._base.errors import helped
 from taxel._base.messages import counted, warn
 from taxel._core import ProblemError
 from taxel.clock import Clock
-from taxel.events import Events, repaired_of
+from taxel.events import Events
 from taxel.frames import Frames
 
 __all__ = ["Recorded", "recorded", "refuse_numbered", "unit_of"]
@@ -115,8 +115,4 @@ def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:
     if (ticks == _core.UNKNOWN).all():
         return events
     first = _core.held_as_events(ticks, int(events.t.min()), events.array)
-    both = (Events._unchecked(**first, array=events.array), events)
-    names = ("t", "x", "y", "p", "intensity", "present")
-    columns: list[Any] = [np.concatenate([getattr(e, name) for e in both]) for name in names]
-    t, x, y, p, ticks, present = columns
-    return Events._unchecked(t, x, y, p, events.array, ticks, present, repaired_of(both), events.markers)
+    return Events._joined((Events._unchecked(**first, array=events.array), events))

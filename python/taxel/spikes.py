@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import checked_path, column, floats, instance, nth, number, several, shown, window
+from taxel._base.arguments import checked_path, column, floats, instance, nth, number, rows, several, shown, window
 from taxel._base.arrays import read_arrays
 from taxel._base.columns import FrozenColumns, frozen, frozen_column
 from taxel._base.drawing import draw
@@ -27,6 +27,8 @@ __all__ = ["SpikeTrains", "to_ms", "to_us"]
 
 Kind = Literal["unsigned", "signed", "graded"]
 _KINDS: tuple[Kind, ...] = get_args(Kind)
+#: A time or several, in the unit of either side.
+_Time = TypeVar("_Time", float, NDArray[Any])
 
 
 class SpikeTrains(FrozenColumns):
@@ -67,6 +69,8 @@ class SpikeTrains(FrozenColumns):
     >>> SpikeTrains([1.0, 5.0], [0, 2], 0.0, 10.0, [0.5, -2.0], kind="graded")
     SpikeTrains(1 train, 2 spikes, graded, 0 to 10 ms)
     """
+
+    _COMPARED: ClassVar[tuple[str, ...]] = ("kind", "values", "start", "stop", "offsets", "times")
 
     def __init__(
         self,
@@ -147,37 +151,6 @@ class SpikeTrains(FrozenColumns):
             raise refused("trains", f"[{shown(train)}]: choose one train by its number, several by select")
         n = nth("train", train, len(self))
         return self.times[self.offsets[n] : self.offsets[n + 1]]
-
-    def __add__(self, other: SpikeTrains) -> SpikeTrains:
-        """Return the spikes of both, train by train in order of time; the window holds both windows.
-
-        With graded trains, the spikes of unsigned trains have the value 1.
-
-        Raises
-        ------
-        ProblemError : another number of trains, or only one of the two is signed
-        """
-        if not isinstance(other, SpikeTrains):
-            return NotImplemented
-        if len(self) != len(other):
-            raise ProblemError(
-                f"{counted(len(self), 'train')} and {len(other)}: only equal numbers of trains can be merged"
-            )
-        if self.signed != other.signed:
-            first, second = sorted((self.kind, other.kind))
-            raise ProblemError(f"{first} and {second} trains: only trains of one kind can be merged; see split_by_sign")
-        times = np.concatenate([self.times, other.times])
-        train = np.concatenate(
-            [np.repeat(np.arange(len(self)), self.counts), np.repeat(np.arange(len(self)), other.counts)]
-        )
-        order = np.lexsort((times, train))
-        values = None
-        kind = max(self.kind, other.kind, key=_KINDS.index)
-        if kind != "unsigned":
-            values = np.concatenate([self._ones_without(), other._ones_without()])[order]
-        offsets = self.offsets + other.offsets
-        start, stop = min(self.start, other.start), max(self.stop, other.stop)
-        return self._of_own(times[order], offsets, start, stop, values, kind)
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -271,8 +244,8 @@ class SpikeTrains(FrozenColumns):
 
         Parameters
         ----------
-        trains : int of shape (n,), 0 or more, or bool of shape (trains,)
-            Numbers of trains, or a mask over all of them.
+        trains : int of shape (n,), or bool of shape (trains,)
+            Numbers of trains, which count from the end if they are negative, or a mask over all of them.
 
         Returns
         -------
@@ -287,21 +260,9 @@ class SpikeTrains(FrozenColumns):
         >>> list(SpikeTrains.from_lists([[1.0], [2.0], [3.0]], stop=10.0).select([2, 0]))
         [array([3.]), array([1.])]
         """
-        try:
-            chosen = np.atleast_1d(np.asarray(trains))
-        except ValueError as error:
-            raise refused("trains", f": {error}") from None
-        if chosen.dtype == bool:
-            if chosen.shape != (len(self),):
-                raise ProblemError(f"mask has shape {chosen.shape}: must be ({len(self)},)")
-            chosen = np.flatnonzero(chosen)
-        numbers = column("trains", chosen, np.int64).tolist()
-        outside = [n for n in numbers if not 0 <= n < len(self)]
-        if outside:
-            raise ProblemError(f"train {outside[0]}: must be from 0 to {len(self) - 1}")
-        values = None
-        if self.values is not None:
-            values = [self.values[self.offsets[n] : self.offsets[n + 1]] for n in numbers]
+        numbers = np.arange(len(self))[rows("trains", trains, len(self))].tolist()
+        every = self._values()
+        values = None if every is None else [every[n] for n in numbers]
         return SpikeTrains.from_lists([self[n] for n in numbers], self.start, self.stop, values, kind=self.kind)
 
     def delayed(self, delays_ms: ArrayLike) -> SpikeTrains:
@@ -387,49 +348,13 @@ class SpikeTrains(FrozenColumns):
         """
         from neo import SpikeTrain  # noqa: PLC0415  heavy
 
-        trains = []
+        trains, every = [], self._values()
         for n in range(len(self)):
             notes: dict[str, Any] = {"value_kind": self.kind} if self.kind == "graded" else {}
-            if self.values is not None:
-                notes["array_annotations"] = {"value": self.values[self.offsets[n] : self.offsets[n + 1]]}
+            if every is not None:
+                notes["array_annotations"] = {"value": every[n]}
             trains.append(SpikeTrain(self[n], units="ms", t_start=self.start, t_stop=self.stop, **notes))
         return trains
-
-    @classmethod
-    def from_neo(cls, trains: Sequence[Any]) -> SpikeTrains:
-        """Build spike trains from ``neo.SpikeTrain`` objects of any time unit.
-
-        Parameters
-        ----------
-        trains : sequence of neo.SpikeTrain
-
-        Returns
-        -------
-        SpikeTrains
-            Their window is the widest window of `trains`. They are graded if all of `trains` have the annotation
-            ``value_kind`` that `to_neo` makes.
-
-        Raises
-        ------
-        ProblemError : an object that is not a ``neo.SpikeTrain``
-        """
-        try:
-            foreign = next(([train] for train in trains if not hasattr(train, "rescale")), [])
-        except TypeError:
-            foreign = [trains]
-        if foreign:
-            raise refused("trains", f": {shown(foreign[0])} must be a neo.SpikeTrain")
-        if not len(trains):
-            return cls.from_lists([])
-        times = [np.asarray(t.rescale("ms").magnitude, np.float64) for t in trains]
-        start = min(float(t.t_start.rescale("ms").magnitude) for t in trains)
-        stop = max(float(t.t_stop.rescale("ms").magnitude) for t in trains)
-        values = None
-        kind: Kind = "unsigned"
-        if all("value" in t.array_annotations for t in trains):
-            values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
-            kind = "graded" if all(t.annotations.get("value_kind") == "graded" for t in trains) else "signed"
-        return cls.from_lists(times, start, stop, values, kind=kind)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, ``values`` if any); return its path.
@@ -513,19 +438,6 @@ class SpikeTrains(FrozenColumns):
         """Build spike trains from new arrays of our own."""
         return cls(frozen(times), frozen(offsets), start, stop, None if values is None else frozen(values), kind=kind)
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, SpikeTrains):
-            return NotImplemented
-        return (
-            self.kind == other.kind
-            and np.array_equal(self._ones_without(), other._ones_without())
-            and (self.start, self.stop) == (other.start, other.stop)
-            and np.array_equal(self.offsets, other.offsets)
-            and np.array_equal(self.times, other.times)
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
     def __repr__(self) -> str:
         kind = "" if self.kind == "unsigned" else f", {self.kind}"
         size = f"{counted(len(self), 'train')}, {counted(len(self.times), 'spike')}"
@@ -558,19 +470,11 @@ def _kind(kind: object, values: NDArray[np.float32] | None) -> Kind:
     return kind
 
 
-@overload
-def to_ms(us: float | np.integer[Any]) -> float: ...
-@overload
-def to_ms(us: NDArray[Any]) -> NDArray[np.float64]: ...
-def to_ms(us: Any) -> Any:
+def to_ms(us: _Time) -> _Time:
     """Convert times of the wire, us, to the unit of neurons, ms."""
     return us / 1000.0
 
 
-@overload
-def to_us(ms: float) -> float: ...
-@overload
-def to_us(ms: NDArray[Any]) -> NDArray[np.float64]: ...
-def to_us(ms: Any) -> Any:
+def to_us(ms: _Time) -> _Time:
     """Convert times of neurons, ms, to the unit of the wire, us, without rounding."""
     return ms * 1000.0

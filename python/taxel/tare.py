@@ -102,17 +102,17 @@ class Tare(Saved):
             None if stop_us is None else integer("stop_us", stop_us),
         )
         given, x = x, recorded(x)
-        if isinstance(x, Events | Frames) and not len(x.t):
+        if not isinstance(x, Events | Frames):
+            raise refused("x", f" is {shown(x)}: must be a taxel.Events or taxel.Frames")
+        if not len(x.t):
             noun, why = ("event" if isinstance(x, Events) else "frame"), getattr(given, "_why_empty", str)()
             raise refused("tare", f": there is no {noun}{why}")
-        if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
+        if window[1] is not None and x.t.min() >= window[1]:
             raise ProblemError(
                 f"tare to {stop_us} us: no events are before this time; the events are from {x.t.min()} to "
                 f"{x.t.max()} us"
             )
-        if isinstance(x, Events | Frames):
-            return cls.from_json(_core.take_tare(x, *window, note))
-        raise refused("x", f" is {shown(x)}: must be a taxel.Events or taxel.Frames")
+        return cls.from_json(_core.take_tare(x, *window, note))
 
     def off(self, frames: Frames) -> Frames:
         """Return frames with each taxel's rest subtracted: 0 if it reads less, or if its rest is unknown.

@@ -46,7 +46,6 @@ MADE = {
     "a region of frames": lambda: frames().region(slice(2, 5), slice(1, 8)),
     "frames of events": lambda: Frames.from_events(events(), 100),
     "trains": trains,
-    "trains of both": lambda: trains() + trains(),
     "delayed trains": lambda: trains().delayed([0.0, 1.0]),
     "split trains": lambda: trains().split_by_sign(),
     "chosen trains": lambda: trains().select([2, 0]),

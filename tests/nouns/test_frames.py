@@ -25,14 +25,6 @@ def some(draw: st.DrawFn) -> Frames:
     return Frames(rng.normal(size=(n, rows, columns)), t, unit="kPa", array=Array(rows, columns, exists=exists))
 
 
-@given(some())
-def test_numpy_gives_the_same_frames_back(frames: Frames) -> None:
-    values, t = frames.to_numpy()
-    assert Frames(values, t, unit="kPa", array=frames.array) == frames
-    values += 1
-    assert np.array_equal(values - 1, frames.values) or np.allclose(values - 1, frames.values, atol=1e-6)
-
-
 @given(some(), st.floats(0, 1), st.integers(0, 10**6))
 def test_a_missing_value_is_the_last_one_of_its_taxel(frames: Frames, share: float, seed: int) -> None:
     values = frames.values.copy()

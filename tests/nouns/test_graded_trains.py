@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from refusal import refused
 
 from taxel import SpikeTrains
@@ -18,11 +17,6 @@ from .trains import some
 
 def graded(*values: float) -> SpikeTrains:
     return SpikeTrains(np.arange(len(values), dtype=float), [0, len(values)], 0.0, 10.0, values, kind="graded")
-
-
-def values_of(trains: SpikeTrains, n: int) -> list[float]:
-    values = np.ones(len(trains.times), np.float32) if trains.values is None else trains.values
-    return values[trains.offsets[n] : trains.offsets[n + 1]].tolist()
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -55,24 +49,6 @@ def test_trains_side_by_side_have_a_window_that_holds_all() -> None:
     for wrong in ([], [3], 3):
         with refused(argument="parts"):
             SpikeTrains.side_by_side(wrong)
-
-
-@given(some(), st.integers(0, 9))
-def test_unsigned_spikes_merged_with_graded_ones_have_the_value_1(trains: SpikeTrains, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    lists = [np.sort(rng.uniform(0, 50, rng.integers(0, 4))) for _ in range(len(trains))]
-    other = SpikeTrains.from_lists(lists, 0.0, 50.0)
-    if trains.signed:
-        with refused():
-            trains + other
-        with refused():
-            trains + SpikeTrains.from_lists(lists, 0.0, 50.0, [np.ones(len(t)) for t in lists], kind="graded")
-        return
-    both = trains + other
-    assert both.kind == trains.kind
-    for n in range(len(trains)):
-        pairs = [*zip(trains[n], values_of(trains, n), strict=True), *((t, 1.0) for t in other[n])]
-        assert list(zip(both[n], values_of(both, n), strict=True)) == sorted(pairs, key=lambda pair: pair[0])
 
 
 def test_a_graded_train_says_its_kind() -> None:

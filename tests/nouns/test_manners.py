@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import taxel
-from taxel import Array, Detections, Events, Frames, SpikeTrains
+from taxel import Array, Detections, Events, Frames
 from taxel._core import ProblemError
 
 mpl.use("Agg")
@@ -33,13 +33,6 @@ def found(seed: int, n: int, *, said: bool = False) -> Detections:
     t = np.sort(rng.integers(0, 50, n))
     label = rng.choice(["contact", "lift"], n) if n else []
     return Detections(label, t, t + rng.integers(0, 5, n), rng.random(n), t + 9 if said else None)
-
-
-def trains(seed: int, *, signed: bool, n: int = 3) -> SpikeTrains:
-    rng = np.random.default_rng(seed)
-    times = [np.sort(np.round(rng.random(rng.integers(0, 9)) * 20) / 2) for _ in range(n)]
-    values = [rng.choice([-1.0, 1.0], len(t)) for t in times] if signed else None
-    return SpikeTrains.from_lists(times, -float(rng.integers(0, 3)), 10.0 + float(rng.integers(0, 3)), values)
 
 
 seeds, sizes = st.integers(0, 10**6), st.integers(0, 30)
@@ -81,28 +74,6 @@ def test_events_of_both_are_merged_by_time_and_nothing_is_lost(
     assert (both.intensity is not None) == any(ticks)
     assert a + Events([], [], [], [], array=GRID) == a
     assert n == 0 or a[: n // 2] + a[n // 2 :] == a
-
-
-@given(seeds, st.booleans())
-def test_trains_of_both_are_merged_train_by_train(seed: int, signed: bool) -> None:
-    a, b = trains(seed, signed=signed), trains(seed + 1, signed=signed)
-    both = a + b
-    assert (both.start, both.stop) == (min(a.start, b.start), max(a.stop, b.stop))
-    for k in range(3):
-        pairs = [pair for one in (a, b) for pair in zip(one[k], _values(one, k), strict=True)]
-        spikes = sorted(pairs, key=lambda pair: pair[0])
-        assert list(zip(both[k], _values(both, k), strict=True)) == spikes
-    assert both.split_by_sign().counts.tolist() == (a.split_by_sign().counts + b.split_by_sign().counts).tolist()
-    assert a.between(a.start, 4.0) + a.between(4.0, a.stop) == SpikeTrains.from_lists(
-        [t[t < a.stop] for t in a],
-        a.start,
-        a.stop,
-        [v[t < a.stop] for v, t in zip((_values(a, k) for k in range(3)), a, strict=True)] if signed else None,
-    )
-
-
-def _values(of: SpikeTrains, k: int) -> np.ndarray:
-    return np.ones(len(of[k])) if of.values is None else of.values[of.offsets[k] : of.offsets[k + 1]]
 
 
 def test_encoders_tares_health_and_detections_take_a_recording(tmp_path: Any) -> None:

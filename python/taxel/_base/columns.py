@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,13 +12,38 @@ from taxel._base.arguments import column, numbers
 
 
 class FrozenColumns:
-    """Keep arrays read-only after a copy or unpickling, which make NumPy's arrays writable."""
+    """Base of data classes of columns: two are equal by their values, and a copy's columns are read-only too."""
 
+    #: The attributes by which two are equal.
+    _COMPARED: ClassVar[tuple[str, ...]]
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in self._COMPARED)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _records(self, names: Iterable[str]) -> NDArray[np.void]:
+        """Return a record for each row, with a field for each of these columns."""
+        columns = {name: getattr(self, name) for name in names}
+        rows = len(next(iter(columns.values())))
+        records = np.empty(rows, [(name, column.dtype) for name, column in columns.items()])
+        for name, values in columns.items():
+            records[name] = values
+        return records
+
+    # A copy and unpickling make NumPy's arrays writable.
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
             if isinstance(value, np.ndarray):
                 frozen(value)
         self.__dict__.update(state)
+
+
+def _equal(mine: object, other: object) -> bool:
+    has_nan = isinstance(mine, np.ndarray) and mine.dtype.kind == "f"
+    return np.array_equal(mine, other, equal_nan=has_nan)  # type: ignore[arg-type]
 
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import checked_path, flag, instance, mapping, number, numbers, several, shown
+from taxel._base.arguments import checked_path, finite, flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.columns import frozen
 from taxel._base.documents import of_json
@@ -112,14 +112,10 @@ class Calibration(Saved):
             same(array, rest.array, "the tare")
             rest = rest.rest
         calibration.rest = None if rest is None else _by_taxel("rest", rest, array)
-        calibration.floor = number("floor", how.get("floor", 0.0))
-        if not 0 <= calibration.floor < math.inf:
-            raise refused("floor", f" is {calibration.floor}: must be 0 or more")
+        calibration.floor = finite("floor", how.get("floor", 0.0), least=0.0)
         calibration.date = _iso(how.get("date"))
         residual = how.get("residual")
-        calibration.residual = None if residual is None else number("residual", residual)
-        if calibration.residual is not None and not 0 <= calibration.residual < math.inf:
-            raise ProblemError(f"residual is {calibration.residual}: must be 0 or more")
+        calibration.residual = None if residual is None else finite("residual", residual, least=0.0)
         calibration.loads = tuple(how.get("loads", ()))
         calibration.note = checked_text("note", how.get("note", ""))
         return calibration
@@ -133,13 +129,12 @@ class Calibration(Saved):
         *,
         unit: str,
         reading_unit: str = "counts",
-        gain: ArrayLike = 1.0,
         rest: Tare | ArrayLike | None = None,
         floor: float = 0.0,
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Interpolate linearly between known points, the same for all taxels except for their gains.
+        """Interpolate linearly between known points, the same for all taxels.
 
         Parameters
         ----------
@@ -150,7 +145,6 @@ class Calibration(Saved):
         unit : {"N", "kPa"}
         reading_unit : str
             Unit of the readings.
-        gain : float or float64, shape (rows, columns), above 0
         rest : Tare or float64, shape (rows, columns), in the unit `reading_unit`, optional
             Default: 0.
         floor : float, in the unit `reading_unit`, 0 or more
@@ -168,7 +162,7 @@ class Calibration(Saved):
         >>> table.apply(Frames([[[5.0]], [[20.0]], [[99.0]]], [0, 1, 2])).values.ravel()
         array([0.5, 3. , 5. ], dtype=float32)
         """
-        how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
+        how = {"rest": rest, "floor": floor, "date": date, "note": note}
         return cls._made(array, table(readings, values), unit, reading_unit, how)
 
     @classmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
+from collections.abc import Sequence
 
 from taxel._base.messages import escaped
 
@@ -23,6 +24,12 @@ def say(*lines: object, err: bool = False) -> None:
     """
     for line in lines:
         print(escaped(line), file=sys.stderr if err else sys.stdout, flush=True)
+
+
+def in_columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return rows of cells as lines, in columns as wide as their widest cells."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
 def table(title: str, cells: list[tuple[str, str]], width: int = WIDTH) -> list[str]:

@@ -9,6 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from taxel.cli._say import in_columns
+
 if TYPE_CHECKING:
     from taxel.formats.ros import Topic
 
@@ -19,18 +21,16 @@ def list_topics(file: Path, found: Sequence[Topic], as_json: bool) -> list[str]:
         return [json.dumps({"file": str(file), "kind": "ros", "topics": [asdict(topic) for topic in found]})]
     if not found:
         return [f"{file}: this ROS bag has no topic with numbers"]
-    rows = [("topic", "field", "shape", "numbers", "messages", "rate")]
+    rows = [("topic", "field", "shape", "numbers", "messages", "rate", "type")]
     for topic in found:
         shape = " x ".join(map(str, topic.shape)) or "-"
         rate = "-" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz"
-        rows.append((topic.topic, topic.field or "-", shape, topic.dtype or "-", str(topic.messages), rate))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    kinds = ["type", *(topic.type + f": {topic.trouble}" * bool(topic.trouble) for topic in found)]
-    lines = [
-        "  " + "  ".join([*(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)), kind])
-        for row, kind in zip(rows, kinds, strict=True)
-    ]
+        kind = topic.type + f": {topic.trouble}" * bool(topic.trouble)
+        rows.append((topic.topic, topic.field or "-", shape, topic.dtype or "-", str(topic.messages), rate, kind))
     # An id is no skin: most numbers are.
     named = max(found, key=lambda topic: (not topic.trouble, math.prod(topic.shape)))
     more = f" --field {named.field}" * bool(named.field) + " --array ROWSxCOLUMNS" * (len(named.shape) < 2)
-    return [f"{file}: ROS bag; open a topic by --topic {named.topic}{more}", *lines]
+    return [
+        f"{file}: ROS bag; open a topic by --topic {named.topic}{more}",
+        *(f"  {line}" for line in in_columns(rows)),
+    ]

@@ -16,14 +16,7 @@ from taxel._base.files import check_writable
 from taxel._base.parallel import Workers
 from taxel._core import ProblemError
 from taxel.cli.app import App, Flat
-from taxel.cli.task import (
-    OutArgument,
-    Output,
-    SourceOption,
-    of_source,
-    progress,
-    say_failures,
-)
+from taxel.cli.task import OutArgument, Output, SourceOption, of_source, progress, say_failures
 from taxel.options import FullReading
 
 if TYPE_CHECKING:

@@ -8,14 +8,12 @@ from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
 from cyclopts import Parameter
-from rich.table import Table
 
 from taxel._base.arguments import text
 from taxel._core import ProblemError
 from taxel.board_check import check_board
-from taxel.cli._say import say
+from taxel.cli._say import in_columns, say
 from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits
-from taxel.cli.console import Console
 from taxel.device import Device, ports
 from taxel.live.sending import PORT
 from taxel.wire import PRESETS, Registers, described
@@ -172,9 +170,6 @@ def _print(device: Device, registers: Registers, as_json: bool) -> None:
         f"{device.cable.place}: {g.rows} x {g.columns} taxels, {g.channels} channels, wire version "
         f"{registers.wire_version}, {1e6 / registers.frame_us:.2f} frames/s"
     )
-    table = Table.grid(padding=(0, 2))
-    for name, value, unit, place, meaning in rows:
-        table.add_row(name, f"{value:g}", unit, place, meaning)
-    Console(soft_wrap=True).print(table)
+    say(*in_columns([(name, f"{value:g}", unit, at, meaning) for name, value, unit, at, meaning in rows]))
     for warning in registers.warnings:
         say(f"warning: {warning}", err=True)

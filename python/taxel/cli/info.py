@@ -22,7 +22,7 @@ from taxel._base.parallel import Workers
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._say import say
+from taxel.cli._say import in_columns, say
 from taxel.cli._topics import list_topics
 from taxel.cli.app import OUTSIDE, App, Flat
 from taxel.cli.task import Output, progress, say_failures, say_warnings
@@ -197,11 +197,10 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
     # What no recording has to say is no column.
     names = [name for name in rows[0] if any(row.get(name) not in (None, "", "unknown") for row in rows)]
     cells = [names, *([row.get(name, "") for name in names] for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     of_notes = ", ".join(f"{text} {count}" for text, count in sorted(notes.items()))
     return [
         f"{place}: {counted(len(of_each), 'recording')}",
-        *("  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in cells),
+        *(f"  {line}" for line in in_columns(cells)),
         *([f"notes: {of_notes}"] if notes else []),
         *(f"{counted(count, 'recording')}: {verdict}" for verdict, count in faults.items()),
         "--each prints all facts about each recording",

@@ -11,6 +11,7 @@ import taxel
 from taxel._base.messages import counted
 from taxel._base.parallel import Workers
 from taxel._core import ProblemError
+from taxel.cli._say import in_columns
 from taxel.cli.app import App, Flat
 from taxel.cli.task import Output, progress, say_warnings
 from taxel.options import InformationOptions, Reading
@@ -82,10 +83,10 @@ def lines(answer: Answer) -> list[str]:
         "the true bits are outside this range more often",
         *(f"warning: {warning}" for warning in answer.warnings),
         "",
-        _row("period", "to", "taxels", "bits", "[95 %]", "events", "kbit/s", "silent", "keeps 95 % of the full bits?"),
     ]
-    text += [_row(*_cells(point), _verdict(point, answer)) for point in (*answer.points, *answer.taxels)]
-    text += ["", *(f"note: {note}" for note in answer.notes)]
+    head = ("period", "to", "taxels", "bits", "[95 %]", "events", "kbit/s", "silent", "keeps 95 % of the full bits?")
+    rows = [(*_cells(point), _verdict(point, answer)) for point in (*answer.points, *answer.taxels)]
+    text += [*in_columns([head, *rows]), "", *(f"note: {note}" for note in answer.notes)]
     text.append(f"rates are of {answer.wire}")
     return text
 
@@ -109,13 +110,6 @@ def _cells(point: Point) -> tuple[str, ...]:
         f"{point.kbps:.3g}",
         f"{100 * point.silent:.0f} %",
     )
-
-
-def _row(*cells: str) -> str:
-    period, window, taxels, bits, interval, events, rate, silent, verdict = cells
-    return (
-        f"{period:<8} {window:>8} {taxels:>7} {bits:>6} {interval:>12} {events:>8} {rate:>8} {silent:>7}  {verdict}"
-    ).rstrip()
 
 
 def _interval(estimate: Estimate) -> str:

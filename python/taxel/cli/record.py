@@ -221,13 +221,6 @@ def _watch(
             before = now
 
 
-def _bytes_and_markers(counters: dict[str, Any]) -> str:
-    """Return the numbers of a board's bytes and markers, in words that follow those of its datagrams."""
-    if counters["lines"] is not None:
-        return ""
-    return f", {counted(counters['capture']['bytes'], 'byte')}, {counted(counters['markers'], 'marker')}"
-
-
 def _print(summary: Summary, as_json: bool) -> None:
     if as_json:
         path = None if summary.path is None else str(summary.path)
@@ -235,7 +228,9 @@ def _print(summary: Summary, as_json: bool) -> None:
         return
     counters = summary.counters
     if summary.path is not None:
-        what = f"{received(counters)}{_bytes_and_markers(counters)}"
+        what = received(counters)
+        if counters["lines"] is None:
+            what += f", {counted(counters['capture']['bytes'], 'byte')}, {counted(counters['markers'], 'marker')}"
         say(f"{summary.path}: {what}, received in {counters['seconds']:.1f} s")
     for name, counts in counters["sources"].items():
         say(f"  {name}: {received(counts)}")

@@ -83,7 +83,7 @@ def later_us(pattern: SpikeTrains, ages: Ages, felt_ms: NDArray[np.float64], age
     fired = np.append(pattern[ages.trains[age]], np.inf)
     first = fired[np.searchsorted(fired, felt_ms + age_ms - _SAME_MS)]
     same = first < after[np.searchsorted(after, felt_ms + _SAME_MS)]
-    return np.rint(to_us(np.where(same, first - (felt_ms + age_ms), 0.0))).astype(np.int64)
+    return np.asarray(np.rint(to_us(np.where(same, first - (felt_ms + age_ms), 0.0))), np.int64)
 
 
 def silent_windows(

@@ -10,18 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number
+from taxel._base.arguments import instance
 from taxel._base.messages import escaped
 from taxel._base.times import beginning_us, begun
-from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
-from taxel.recording.analysis.pressure import Series, above_rest
-from taxel.recording.analysis.rest import Rest
+from taxel.recording.analysis.pressure import above_rest
 
 F = TypeVar("F", bound=FigureBase)
 
-_AXES = {"x": "#c44e52", "y": "#4c72b0"}
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
 
 
@@ -97,61 +94,6 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         if note.t is not None:
             over.axvline((note.t - begin_us) / 1e6, color="grey", linestyle=":", linewidth=0.8)
     over.set(xlabel=_time(begin_us), title=escaped(recording.title.removeprefix(f"{recording.path.parent}/")))
-    return figure
-
-
-@overload
-def pressure(frames: Frames, above: float = 0.0, figure: None = None) -> Figure: ...
-@overload
-def pressure(frames: Frames, above: float = 0.0, *, figure: F) -> F: ...
-def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = None) -> FigureBase:
-    """Draw contact area, peak, sum and centre of pressure over time; for channels, peak and sum.
-
-    Parameters
-    ----------
-    frames : Frames
-    above : float, from 0, in the frames' unit
-        The value above which a taxel counts as loaded.
-    figure : matplotlib.figure.FigureBase, optional
-        The figure or subfigure to draw in; default: a new one.
-
-    Returns
-    -------
-    matplotlib.figure.FigureBase
-
-    Raises
-    ------
-    ProblemError : not frames; not a finite number; not a figure of matplotlib
-
-    Examples
-    --------
-    >>> import numpy as np, taxel
-    >>> array = taxel.Array(2, 3, pitch_mm=2.0)
-    >>> frames = taxel.Frames(np.arange(12.0).reshape(2, 2, 3), [0, 1500], unit="kPa", array=array)
-    >>> [ax.get_ylabel() for ax in pressure(frames).axes]
-    ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
-    """
-    series = Series.from_frames(instance("frames", frames, Frames), number("above", above), Rest("none"))
-    if figure is None:
-        figure = plt.figure(figsize=(11, 6), layout="constrained")
-    begin_us = beginning_us(frames.t)
-    t = (frames.t - begin_us) / 1e6
-    # Both parts of a centre are one curve of two lines.
-    parted = {name: name.split("_", 1) for name in series.columns if name != "force_N"}
-    kinds = dict.fromkeys(kind for kind, _ in parted.values())
-    rows = instance("figure", figure, FigureBase).subplots(len(kinds), 1, sharex=True)
-    for ax, kind in zip(rows, kinds, strict=True):
-        for name, (of, unit) in parted.items():
-            if of == kind != "centre":
-                ax.plot(t, series.columns[name], color="black", linewidth=0.8)
-                ax.set_ylabel(escaped(f"{'contact ' * (kind == 'area')}{kind} ({unit})"))
-            elif of == kind:
-                axis, _, of_axis = unit.partition("_")
-                title = {"x": "column", "y": "row"}[axis] if of_axis == "taxels" else axis
-                ax.plot(t, series.columns[name], color=_AXES[axis], linewidth=0.8, label=title)
-                ax.set_ylabel(escaped(f"centre ({of_axis})"))
-                ax.legend(loc="upper right")
-    rows[-1].set_xlabel(_time(begin_us))
     return figure
 
 

@@ -105,7 +105,9 @@ def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
     tables = [part.table if not k else part.table._moved(t) for part, k, t in zip(parts, shifts, later, strict=True)]
     events = [table for table in tables if isinstance(table, Events)]
     table: Events | Frames = (
-        Events._joined(events) if events else Frames._joined([table for table in tables if isinstance(table, Frames)])
+        Events._joined(events).sorted()
+        if events
+        else Frames._joined([table for table in tables if isinstance(table, Frames)])
     )
     marks = [part.marks.moved(times) for part, times in zip(parts, later, strict=True)]
     begins = [int(each.t.min()) if len(each) else shift for each, shift in zip(tables, shifts, strict=True)]

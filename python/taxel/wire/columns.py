@@ -48,7 +48,8 @@ def filled(array: Array, rows: int, fill: Callable[[Columns], _core._Filled]) ->
         columns = Columns(*(column[:n].copy() for column in columns))
     t, x, y, ticks, p, present = (frozen_whole(column[:n]) for column in columns)
     intensity, stated = (ticks, present) if written["paired"] else (None, None)
-    return Events._unchecked(t, x, y, p, array, intensity, stated, written["repaired"], written["markers"])
+    states = {"intensity": intensity, "present": stated, "repaired": written["repaired"]}
+    return Events._unchecked(array, written["markers"], t=t, x=x, y=y, p=p, **states)
 
 
 def _columns(rows: int) -> Columns:
