@@ -155,6 +155,7 @@ class LoadCurve:
         frame_us: float,
         wire_version: int,
         tare: str | None,
+        touched_ms: float | None = None,
     ) -> list[LoadCurve]: ...
     @staticmethod
     def of_frames(
@@ -164,6 +165,7 @@ class LoadCurve:
         frames: Frames,
         frame_us: float | None,
         tare: str | None,
+        touched_ms: float | None = None,
     ) -> list[LoadCurve]: ...
     def changes(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
     def edges(

@@ -97,9 +97,16 @@ class ByLoop:
         of_levels = {"count": Count, "begin_area": BeginArea}
         held, follows = np.zeros(ARRAY.shape), Changes(name) if name in CHANGES else None
         follows = of_levels[name](rule.levels) if name in of_levels else follows
+        touched_since = None
 
         def measured(t, held):
-            return t, quantity("area", held), quantity(name, held) if follows is None else follows.at(t, held)
+            nonlocal touched_since
+            area, value = quantity("area", held), quantity(name, held) if follows is None else follows.at(t, held)
+            touched_since = None if area < 1 else t if touched_since is None else touched_since
+            counts = rule.touched_ms is None or (
+                touched_since is not None and t - touched_since >= 1000 * rule.touched_ms
+            )
+            return t, area, value if counts else 0.0
 
         if isinstance(source, Frames):
             self.starts = [int(t) for t in source.t]
@@ -118,7 +125,7 @@ class ByLoop:
             self.frames.setdefault(frame_of(now, period, stamp), []).append(measured(now, held))
             # What a rest that follows changes is computed between stamps too.
             again = now + 10_000
-            while name in CHANGES and again < following:
+            while (name in CHANGES or rule.touched_ms is not None) and again < following:
                 self.frames.setdefault(frame_of(again, period, stamp), []).append(measured(again, held))
                 again += max(10_000, (again - now) // 8)
         self.end = lambda k: math.ceil((k + 1) * period)
@@ -208,6 +215,7 @@ def rules(draw):
         how["levels"] = draw(st.sampled_from([[0.05], [0.192, 0.4], [0.1, 1.0, 20.0]]))
     if draw(st.booleans()):
         how["date"] = release + draw(st.sampled_from([0.0, 0.3, 0.5, 1.0])) * (1.0 - release)
+    how["touched_ms"] = draw(st.sampled_from([None, None, 0.0, 0.3, 5.0]))
     quiet_ms, how["constant_ms"] = (
         draw(st.sampled_from([0.0, 0.0, 0.1, 0.192, 1.0, 40.0])),
         draw(st.sampled_from([0.0, 0.3, -2.0])),

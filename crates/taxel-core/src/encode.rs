@@ -26,6 +26,7 @@ mod side_by_side;
 mod slowly_adapting;
 mod stream;
 mod tare;
+mod touched;
 
 use std::collections::BTreeMap;
 
@@ -33,7 +34,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 pub use pieces::Pieces;
-pub use quantity::Quantity;
+pub use quantity::{Measure, Quantity};
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};

@@ -7,7 +7,7 @@ use taxel_core::detect::{
     Decision, Detection, Detector, EdgeNumbers, FrameClock, FrameTime, LoadCurve as CoreCurve, PlainRule, Readout,
     ReadoutStream as CoreStream, Reference, Spread, score as score_core,
 };
-use taxel_core::encode::{Quantity, Tare, Zeroing};
+use taxel_core::encode::{Measure, Quantity, Tare, Zeroing};
 use taxel_core::metrics::matching::in_order;
 use taxel_core::rest::{Following, LeftFloor};
 use taxel_core::spikes::us;
@@ -334,6 +334,7 @@ pub struct LoadCurve(CoreCurve);
 #[pymethods]
 impl LoadCurve {
     #[staticmethod]
+    #[pyo3(signature = (quantities, levels, noise_floor, events, frame_us, wire_version, tare, touched_ms=None))]
     fn of_events(
         py: Python<'_>,
         quantities: Vec<String>,
@@ -343,17 +344,18 @@ impl LoadCurve {
         frame_us: f64,
         wire_version: u8,
         tare: Option<&str>,
+        touched_ms: Option<f64>,
     ) -> PyResult<Vec<Self>> {
         let (quantities, tare) = (to_quantities(&quantities)?, parse_tare(tare)?);
         let events = events.view()?;
         let frames = FrameTime::on_wire(frame_us, wire_version);
-        let made = |stop: Stop<'_>| {
-            CoreCurve::of_events(&quantities, &levels, noise_floor, events, frames, tare.as_ref(), stop)
-        };
+        let measure = Measure { levels: &levels, noise_floor, touched_ms };
+        let made = |stop: Stop<'_>| CoreCurve::of_events(&quantities, measure, events, frames, tare.as_ref(), stop);
         Ok(enter(py, made)?.into_iter().map(Self).collect())
     }
 
     #[staticmethod]
+    #[pyo3(signature = (quantities, levels, noise_floor, frames, frame_us, tare, touched_ms=None))]
     fn of_frames(
         py: Python<'_>,
         quantities: Vec<String>,
@@ -362,12 +364,12 @@ impl LoadCurve {
         frames: FramesIn<'_>,
         frame_us: Option<f64>,
         tare: Option<&str>,
+        touched_ms: Option<f64>,
     ) -> PyResult<Vec<Self>> {
         let (quantities, tare) = (to_quantities(&quantities)?, parse_tare(tare)?);
         let frames = frames.view()?;
-        let made = |stop: Stop<'_>| {
-            CoreCurve::of_frames(&quantities, &levels, noise_floor, frames, frame_us, tare.as_ref(), stop)
-        };
+        let measure = Measure { levels: &levels, noise_floor, touched_ms };
+        let made = |stop: Stop<'_>| CoreCurve::of_frames(&quantities, measure, frames, frame_us, tare.as_ref(), stop);
         Ok(enter(py, made)?.into_iter().map(Self).collect())
     }
 

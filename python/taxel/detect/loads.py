@@ -30,6 +30,8 @@ _READ_FRAMES = 5000
 
 #: How long a frame lasts (us; None: as the source says), and the wire's version.
 Clock: TypeAlias = tuple[float | None, int]
+#: The levels of a count, and how long the sensor must have been touched, as of `PlainRule`.
+_How: TypeAlias = tuple[tuple[float, ...], float | None]
 #: An example, by its place, and from when to when, us; as `taxel.detect.Part`.
 Stretch: TypeAlias = tuple[int, float, float]
 
@@ -71,6 +73,7 @@ class EdgeRule(NamedTuple):
     quiet_ms: float = 0.0
     date: float | None = None
     levels: tuple[float, ...] = ()
+    touched_ms: float | None = None
 
 
 class Loads:
@@ -89,8 +92,8 @@ class Loads:
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
         self.frame_ms = max(frame_ms(example.source) for example in examples)
-        self._curves: dict[tuple[str, tuple[float, ...]], list[_core.LoadCurve]] = {}
-        self._changes: dict[tuple[str, tuple[float, ...]], list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
+        self._curves: dict[tuple[str, *_How], list[_core.LoadCurve]] = {}
+        self._changes: dict[tuple[str, *_How], list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._ages: dict[float, FoundTimes] = {}
 
     @property
@@ -123,19 +126,22 @@ class Loads:
         """The quantities whose thresholds labels are."""
         return frozenset(example.labels_of for example in self._examples) - {""}
 
-    def _curves_of(self, quantity: str, levels: tuple[float, ...] = ()) -> list[_core.LoadCurve]:
+    def _curves_of(
+        self, quantity: str, levels: tuple[float, ...] = (), touched_ms: float | None = None
+    ) -> list[_core.LoadCurve]:
         """Return a quantity of each example; `levels` are those of a count."""
-        if (quantity, levels) not in self._curves:
+        how = levels, touched_ms
+        if (quantity, *how) not in self._curves:
             self._report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
             together = next((names for names in _TOGETHER if quantity in names), (quantity,))
             measured = [
-                _curves(together, levels, self.noise_floor, example, *clock)
+                _curves(together, how, self.noise_floor, example, *clock)
                 for example, clock in zip(self._examples, self._clocks, strict=True)
             ]
             self._curves |= {
-                (name, levels): list(of) for name, of in zip(together, zip(*measured, strict=True), strict=True)
+                (name, *how): list(of) for name, of in zip(together, zip(*measured, strict=True), strict=True)
             }
-        return self._curves[quantity, levels]
+        return self._curves[quantity, *how]
 
     @cached_property
     def readings(self) -> NDArray[np.float64]:
@@ -156,7 +162,10 @@ class Loads:
     def edges(self, rule: EdgeRule) -> tuple[FoundTimes, FoundTimes]:
         """Return the begins and the ends of loads."""
         numbers = rule.level, rule.release, rule.quiet_ms, rule.date
-        sides = zip(*(curve.edges(*numbers) for curve in self._curves_of(rule.quantity, rule.levels)), strict=True)
+        sides = zip(
+            *(curve.edges(*numbers) for curve in self._curves_of(rule.quantity, rule.levels, rule.touched_ms)),
+            strict=True,
+        )
         begins, ends = map(self._together, sides)
         return begins, ends
 
@@ -183,19 +192,25 @@ class Loads:
         return self._together([curve.at_end() for curve in self._curves_of("area")])
 
     def changes(
-        self, quantity: str, k: int, levels: tuple[float, ...] = ()
+        self, quantity: str, k: int, levels: tuple[float, ...] = (), touched_ms: float | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return when a quantity changes in example k, us by its clock, and what it is after that."""
-        key = quantity, levels
+        key = quantity, levels, touched_ms
         if key not in self._changes:
             self._changes[key] = [curve.changes() for curve in self._curves_of(*key)]
         return self._changes[key][k]
 
-    def values(self, quantity: str, parts: Iterable[Stretch], levels: tuple[float, ...] = ()) -> NDArray[np.float64]:
+    def values(
+        self,
+        quantity: str,
+        parts: Iterable[Stretch],
+        levels: tuple[float, ...] = (),
+        touched_ms: float | None = None,
+    ) -> NDArray[np.float64]:
         """Return what a quantity is after each of its changes in parts of the examples."""
         inside = [np.empty(0)]
         for k, start, stop in parts:
-            t, values = self.changes(quantity, k, levels)
+            t, values = self.changes(quantity, k, levels, touched_ms)
             inside.append(values[(t >= start) & (t < stop)])
         return np.concatenate(inside)
 
@@ -274,15 +289,16 @@ def _first(example: Example) -> int:
 
 def _curves(
     quantities: Sequence[str],
-    levels: tuple[float, ...],
+    levels_and_touched: _How,
     noise_floor: float,
     example: Example,
     frame_us: float | None,
     wire_version: int,
 ) -> list[_core.LoadCurve]:
     """Return quantities over an example, each a curve."""
+    levels, touched_ms = levels_and_touched
     source, tare, how = example.source, tare_text(example.tare), (list(quantities), list(levels), noise_floor)
     if isinstance(source, Frames):
-        return _core.LoadCurve.of_frames(*how, source, frame_us, tare)
+        return _core.LoadCurve.of_frames(*how, source, frame_us, tare, touched_ms)
     period = FRAME_US if frame_us is None else frame_us
-    return _core.LoadCurve.of_events(*how, source, period, wire_version, tare)  # type: ignore[arg-type]
+    return _core.LoadCurve.of_events(*how, source, period, wire_version, tare, touched_ms)  # type: ignore[arg-type]

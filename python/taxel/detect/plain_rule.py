@@ -60,6 +60,9 @@ class PlainRule(_Detector):
         `known` stays.
     constant_ms : float, ms
         By how much labels are earlier than that at the median.
+    touched_ms : float, ms, from 0 to 60 000, optional
+        How long the sensor must have been touched (an area of 1 or more): before, and while nothing is, the quantity is
+        0, so that only what happens within a touch counts, and not its begin. Not with `age_ms`.
     levels : sequence of float, above 0, ascending
         The levels of a count and of the begin area, and of no other quantity. A taxel is above a level of a count until
         it is below seven tenths of it.
@@ -82,9 +85,9 @@ class PlainRule(_Detector):
     -----
     A frame of events is the board's; its quantity is that after its last event, and its time the stamp with which the
     quantity passed the level. Silent frames count: taxels hold their values, and are at rest before the first. Each of
-    a `Frames` is one frame. What is measured from running means also changes while nothing comes: it is computed 10 ms
-    after the last stamp too, and after the first 80 ms again after each further eighth of the time since it. Detections
-    have no slope (NaN).
+    a `Frames` is one frame. What is measured from running means, or while touched, also changes while nothing comes: it
+    is computed 10 ms after the last stamp too, and after the first 80 ms again after each further eighth of the time
+    since it. Detections have no slope (NaN).
 
     Examples
     --------
@@ -116,6 +119,7 @@ class PlainRule(_Detector):
         *,
         date: float | None = None,
         constant_ms: float = 0.0,
+        touched_ms: float | None = None,
         levels: Sequence[float] = (),
         labels: Sequence[str | None] | None = None,
         noise_floor: float = 3.0,
@@ -134,6 +138,7 @@ class PlainRule(_Detector):
                         "quiet_ms": number("quiet_ms", quiet_ms),
                         "date": None if date is None else number("date", date),
                         "constant_ms": number("constant_ms", constant_ms),
+                        "touched_ms": None if touched_ms is None else number("touched_ms", touched_ms),
                         "levels": floats("levels", levels),
                         "age_ms": age,
                         "labels": _labels(labels, age),
@@ -188,6 +193,12 @@ class PlainRule(_Detector):
         return float(self._parts["constant_ms"])
 
     @property
+    def touched_ms(self) -> float | None:
+        """How long the sensor must have been touched, ms; None where the quantity counts always."""
+        touched = self._parts.get("touched_ms")
+        return None if touched is None else float(touched)
+
+    @property
     def levels(self) -> tuple[float, ...]:
         """The levels of a count; none of other quantities."""
         return tuple(self._parts.get("levels", ()))
@@ -216,7 +227,7 @@ class PlainRule(_Detector):
 
     @property
     def _needs_tare(self) -> bool:
-        return self.tare is None and self.quantity != "range_load"
+        return self.tare is None and (self.quantity != "range_load" or self.touched_ms is not None)
 
     @property
     def array(self) -> Array | None:
@@ -251,6 +262,8 @@ class PlainRule(_Detector):
         how = f"{self._named_quantity} >= {level}, release {self.release:g}"
         if self._parts["labels"][0] is None:
             how = f"{self._named_quantity} falls below {plain(self.release * self.level, 3)} after {level} or more"
+        if self.touched_ms is not None:
+            how += f", {self.touched_ms:g} ms after a touch began"
         if self.quiet_ms:
             how += f", for {self.quiet_ms:g} ms"
         if self.date is not None:

@@ -31,6 +31,10 @@ QUIETS_MS = (0.0, 50.0)
 #: So many levels of a count are geometric steps from the noise floor, or of channels from that part of it, to this
 #: quantile of what loaded taxels read.
 LEVELS, LEAST_SHARE, MOST = 8, 0.1, 0.5
+#: A touch has settled after so long, ms. It was chosen on the recordings that `taxel bench grip` learns from.
+SETTLING_MS = 200.0
+#: For how long what happens within a touch is below the release, ms.
+QUIETS_WITHIN_MS = (0.0, 50.0, 200.0)
 #: Without its largest taxel the load of so many taxels is tried.
 SPARE = 8
 #: Levels of the area where a touch began, ms, each alone.
@@ -215,6 +219,8 @@ class Tuning:
         self.off_ms = max(OFF * window_ms, loads.frame_ms)
         self._truth = {name: loads.truth(name, loads.whole_examples) for name in names}
         self._windows = loads.windows(loads.whole_examples)
+        #: Whether labels of one name lie within touches, most of them.
+        self._within = any(2 * loads.inside(name, self._width_us) > len(true) for name, true in self._truth.items())
         self._tried: set[EdgeRule] = set()
         #: Of a label at the begins and at the ends of loads.
         self._outcomes: dict[tuple[str, int], _Outcomes] = {}
@@ -226,7 +232,7 @@ class Tuning:
         """
         windows = self.loads.windows(parts)
         truth = {name: self.loads.truth(name, parts) for name in self._names}
-        grid = list(_grid(self.loads, parts, only))
+        grid = [*_grid(self.loads, parts, only), *(_within_touches(self.loads, parts) if self._within else ())]
         edges = {name: tuple(self._best_at(name, edge, windows, grid) for edge in (0, 1)) for name in self._names}
         onsets = [name for name, pair in edges.items() if _is_onset(*pair)]
         single = {name: self._better(pair, len(truth[name])) for name, pair in edges.items()}
@@ -374,7 +380,7 @@ class Tuning:
             edges = self.loads.at_end()
         elif rule.age_ms is None:
             numbers = rule.quantity, rule.level, rule.release, rule.quiet_ms, rule.date, rule.levels
-            edges = self.loads.edges(EdgeRule(*numbers))[label_index]
+            edges = self.loads.edges(EdgeRule(*numbers, rule.touched_ms))[label_index]
             edges = edges._replace(t=edges.t - round(float(to_us(rule.constant_ms))))
         else:
             edges = self.loads.at_age(rule.age_ms)
@@ -470,6 +476,16 @@ def _grid(loads: Loads, parts: Sequence[Stretch], only: str | None) -> Iterator[
                 for date, quiet_ms in product(dates, QUIETS_MS) if end not in ends else ():
                     yield EdgeRule(quantity, level, release, quiet_ms, date, levels)
                 ends.add(end)
+
+
+def _within_touches(loads: Loads, parts: Sequence[Stretch]) -> Iterator[EdgeRule]:
+    """Yield the rules of what happens within touches."""
+    for quantity in ("moved", "rise", "fall") if loads.taxels > 1 else ("rise", "fall"):
+        values = loads.values(quantity, parts, touched_ms=SETTLING_MS)
+        for level in _levels(quantity, values, loads.noise_floor, 1):
+            for release, quiet_ms in product(RELEASES[1::2], QUIETS_WITHIN_MS):
+                for date in (None, (1.0 + release) / 2) if release < 1.0 else (None,):
+                    yield EdgeRule(quantity, level, release, quiet_ms, date, touched_ms=SETTLING_MS)
 
 
 def _quantities(loads: Loads, only: str | None) -> Iterator[tuple[str, tuple[float, ...]]]:

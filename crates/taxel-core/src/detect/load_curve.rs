@@ -3,7 +3,7 @@
 use crate::detect::detector::{SILENCE_US, usual_distance};
 use crate::detect::running_rule::{Decision, EdgeNumbers, Limits, RunningRule};
 use crate::detect::{FrameClock, FrameTime};
-use crate::encode::{Quantity, Tare};
+use crate::encode::{Measure, Quantity, Tare};
 use crate::spikes::us;
 use crate::{EventsView, FramesView, Result, Spike, Stop, problem};
 
@@ -27,7 +27,7 @@ pub struct LoadCurve {
 }
 
 impl LoadCurve {
-    /// Each of several quantities in a recording of events; `levels` are those of a count.
+    /// Each of several quantities in a recording of events.
     ///
     /// # Errors
     ///
@@ -35,14 +35,13 @@ impl LoadCurve {
     /// stop.
     pub fn of_events(
         quantities: &[Quantity],
-        levels: &[f64],
-        noise_floor: f64,
+        measure: Measure<'_>,
         events: EventsView<'_>,
         frames: FrameTime,
         tare: Option<&Tare>,
         stop: Stop<'_>,
     ) -> Result<Vec<Self>> {
-        let mut stream = Quantity::stream(quantities, levels, events.array, tare, noise_floor)?;
+        let mut stream = Quantity::stream(quantities, measure, events.array, tare)?;
         let clock = FrameClock::new(frames)?;
         events.check()?;
         events.check_order()?;
@@ -56,22 +55,20 @@ impl LoadCurve {
         Ok(Self::of_each(quantities, &changes, &[], clock, frames.period_us, last))
     }
 
-    /// Each of several quantities in a recording of frames, which last `frame_us`, or by default their median distance;
-    /// `levels` are those of a count.
+    /// Each of several quantities in a recording of frames, which last `frame_us`, or by default their median distance.
     ///
     /// # Errors
     ///
     /// Those of [`Quantity::stream`], [`FrameClock::new`] and [`FramesView::check`]; `Interrupted` if asked to stop.
     pub fn of_frames(
         quantities: &[Quantity],
-        levels: &[f64],
-        noise_floor: f64,
+        measure: Measure<'_>,
         frames: FramesView<'_>,
         frame_us: Option<f64>,
         tare: Option<&Tare>,
         stop: Stop<'_>,
     ) -> Result<Vec<Self>> {
-        let mut stream = Quantity::stream(quantities, levels, frames.array, tare, noise_floor)?;
+        let mut stream = Quantity::stream(quantities, measure, frames.array, tare)?;
         let period_us = frame_us.map_or_else(|| usual_distance(frames.t), Ok)?;
         let clock = FrameClock::new(period_us)?;
         frames.check()?;

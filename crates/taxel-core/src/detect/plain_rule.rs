@@ -7,7 +7,7 @@ use crate::allowed::above_0;
 use crate::detect::running_rule::{EdgeNumbers, Limits, RunningRule};
 use crate::detect::stream::Way;
 use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainingData, file};
-use crate::encode::{Quantity, Tare};
+use crate::encode::{Measure, Quantity, Tare};
 use crate::rest::Following;
 use crate::spikes::us;
 use crate::{Array, Result, problem, reading};
@@ -43,7 +43,8 @@ pub enum NamedAge {
 /// quantity came to the level, or below `release` times it, or with a date when it last rose to `date` times the level, or
 /// fell below that; `constant_ms` is taken off. It is `known` when the frame is complete in which the load begins, or that
 /// holds at the end of the quiet time. A frame's quantity is that after its last event; its time is the stamp with which the
-/// quantity passed the level. A frame of the input is one frame.
+/// quantity passed the level. A frame of the input is one frame. With `touched_ms` the quantity is 0 unless the sensor has
+/// been touched for so long (an area of 1 or more).
 ///
 /// With an age it decides once a touch. A touch begins with the first frame in which the area is 2 taxels or more, and
 /// ends with the first in which it is less. The label is that of the quantity in the frame that holds at the age after
@@ -66,6 +67,9 @@ pub struct PlainRule {
     pub date: Option<f64>,
     /// By how much labels are earlier than that at the median, ms, which is taken off `t`.
     pub constant_ms: f64,
+    /// How long the sensor must have been touched, ms; before that the quantity counts as 0. `None`: it counts always.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub touched_ms: Option<f64>,
     /// The levels of a count, or of the area where a touch began, above 0 and ascending; none of other quantities.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<f64>,
@@ -106,6 +110,11 @@ impl PlainRule {
         if !(0.0..=LONGEST_MS).contains(&self.quiet_ms) {
             return Err(problem!("quiet_ms"; " is {}: must be from 0 to {LONGEST_MS}", self.quiet_ms));
         }
+        if let Some(touched) = self.touched_ms
+            && !(0.0..=LONGEST_MS).contains(&touched)
+        {
+            return Err(problem!("touched_ms"; " is {touched}: must be from 0 to {LONGEST_MS}"));
+        }
         if !(-LONGEST_MS..=LONGEST_MS).contains(&self.constant_ms) {
             return Err(problem!("constant_ms"; " is {}: must be within {LONGEST_MS} of 0", self.constant_ms));
         }
@@ -123,6 +132,9 @@ impl PlainRule {
                 && !(0.0..=LONGEST_MS).contains(&age)
             {
                 return Err(problem!("age_ms"; " is {age}: must be from 0 to {LONGEST_MS}"));
+            }
+            if self.touched_ms.is_some() {
+                return Err(problem!("age_ms"; " and touched_ms: must not be given together"));
             }
             if self.release < 1.0 || self.quiet_ms > 0.0 || self.date.is_some() {
                 return Err(problem!(
@@ -178,7 +190,10 @@ impl PlainRule {
     /// The way of its stream, for an array.
     pub(super) fn way(&self, array: &Array, tare: Option<&Tare>) -> Result<Way> {
         self.check()?;
-        let loads = Quantity::stream(&self.read(), &self.levels, array, tare.or(self.tare.as_ref()), self.noise_floor)?;
+        let tare = tare.or(self.tare.as_ref());
+        let Self { levels, noise_floor, touched_ms, .. } = self;
+        let measure = Measure { levels, noise_floor: *noise_floor, touched_ms: *touched_ms };
+        let loads = Quantity::stream(&self.read(), measure, array, tare)?;
         let constant = us(self.constant_ms).round() as i64;
         Ok(Way::of_rule(loads, RunningRule::new(self.limits()), self.labels.clone(), constant))
     }

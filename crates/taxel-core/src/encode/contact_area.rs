@@ -52,7 +52,7 @@ impl Encoding for ContactArea {
         let loaded = Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?;
         let levels: Vec<f64> = self.levels.iter().map(|&level| f64::from(level)).collect();
         let emit = Emit::Crossings(Levels::of_each(1, &levels, 1.0));
-        Ok(features::stream(vec![Feature::Area(loaded)], rest, emit, array, self.trains_of(array)))
+        Ok(features::stream(vec![Feature::Area(loaded)], None, rest, emit, array, self.trains_of(array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {

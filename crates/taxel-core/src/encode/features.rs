@@ -12,6 +12,7 @@ use super::moved::Moved;
 use super::peak_load::PeakLoad;
 use super::range_load::RangeLoad;
 use super::stream::Stream;
+use super::touched::Touched;
 use crate::rest::Rest;
 use crate::spikes::ms;
 use crate::{Array, Spike};
@@ -94,22 +95,25 @@ pub(super) enum Emit {
 #[derive(Clone)]
 struct FeatureRule {
     features: Vec<Feature>,
+    /// When they count; at all other times they are 0. `None`: always.
+    touched: Option<Touched>,
     /// The rest of each taxel as it was measured or set.
     rest: Rest<f64>,
     values: Vec<f64>,
     emit: Emit,
 }
 
-/// A stream of features at each stamp of events, or each frame.
+/// A stream of features at each stamp of events, or each frame; they are 0 when `touched` is given and does not hold.
 pub(super) fn stream(
     features: Vec<Feature>,
+    touched: Option<Touched>,
     rest: Rest<f64>,
     emit: Emit,
     array: &Array,
     trains: Trains,
 ) -> Box<dyn Stream> {
-    let clock = Clock::Stamps { drifts: features.iter().any(Feature::drifts) };
-    let rule = FeatureRule { features, rest, values: vec![], emit };
+    let clock = Clock::Stamps { drifts: touched.is_some() || features.iter().any(Feature::drifts) };
+    let rule = FeatureRule { features, touched, rest, values: vec![], emit };
     Box::new(Driver::new(rule, Channels::grid(array), trains, clock))
 }
 
@@ -126,9 +130,12 @@ impl Rule for FeatureRule {
 
     #[inline(always)]
     fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
-        let Self { features, values, emit, .. } = self;
+        let Self { features, touched, values, emit, .. } = self;
         values.clear();
         features.iter_mut().for_each(|feature| feature.take(now, values));
+        if touched.as_mut().is_some_and(|touched| !touched.take(now)) {
+            values.fill(0.0);
+        }
         // In single precision, which holds every number of taxels and of their levels exactly.
         match emit {
             Emit::Crossings(levels) => {
@@ -160,11 +167,17 @@ impl Rule for FeatureRule {
                 _ => {}
             }
         }
+        if let Some(touched) = &mut self.touched {
+            touched.loaded().take(channel, to);
+        }
     }
 
     fn set_rest(&mut self, channel: usize, rest: f64) {
         self.rest.set(channel, rest);
         self.features.iter_mut().for_each(|feature| feature.set_rest(channel, rest));
+        if let Some(touched) = &mut self.touched {
+            touched.loaded().set_rest(channel, rest);
+        }
     }
 
     fn rest(&self, channel: usize) -> Option<f64> {

@@ -180,7 +180,7 @@ impl Encoding for LocalLoad {
         let rest = require_tare("local load", self.tare.as_ref())?.rest_of(array)?;
         let emit = Emit::Crossings(Levels::of_each(self.sums_with_levels(), &self.levels, self.release));
         let sums = Feature::Local(self.sums(array)?);
-        Ok(features::stream(vec![sums], rest, emit, array, self.trains_of(array)))
+        Ok(features::stream(vec![sums], None, rest, emit, array, self.trains_of(array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {

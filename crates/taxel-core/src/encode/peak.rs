@@ -56,7 +56,7 @@ impl Encoding for Peak {
         let tare = require_tare("peak", self.tare.as_ref())?;
         let peak = Feature::Peak(PeakLoad::new(array, tare, self.least_noise)?);
         let emit = Emit::Crossings(Levels::of_each(1, &self.levels, self.release));
-        Ok(features::stream(vec![peak], tare.rest_of(array)?, emit, array, self.trains_of(array)))
+        Ok(features::stream(vec![peak], None, tare.rest_of(array)?, emit, array, self.trains_of(array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {

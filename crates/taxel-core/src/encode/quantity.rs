@@ -14,6 +14,7 @@ use super::moved::Moved;
 use super::range_load::RangeLoad;
 use super::stream::Stream;
 use super::tare::Tare;
+use super::touched::Touched;
 use crate::rest::{Rest, Value, step_of};
 use crate::{Array, Result, SpikeKind, problem};
 
@@ -59,6 +60,17 @@ pub enum Quantity {
     Duration,
 }
 
+/// The numbers by which quantities are measured.
+#[derive(Debug, Clone, Copy)]
+pub struct Measure<'a> {
+    /// The levels of a count, or of the begin area; none of others.
+    pub levels: &'a [f64],
+    /// In the sensor's unit.
+    pub noise_floor: f64,
+    /// Quantities are 0 unless the sensor has been touched for so long, ms.
+    pub touched_ms: Option<f64>,
+}
+
 impl Quantity {
     /// Whether it is a sum over taxels beside each other, which channels have none of.
     fn is_local(self) -> bool {
@@ -72,7 +84,7 @@ impl Quantity {
     }
 
     /// Starts a stream in which each quantity is a train: a spike for every change, with the new value, in single
-    /// precision. The first frame shows the first values; of events all are 0 at first. The `levels` are those of a count.
+    /// precision. The first frame shows the first values; of events all are 0 at first.
     ///
     /// # Errors
     ///
@@ -81,18 +93,19 @@ impl Quantity {
     /// for the duration.
     pub fn stream(
         several: &[Self],
-        levels: &[f64],
+        measure: Measure<'_>,
         array: &Array,
         tare: Option<&Tare>,
-        noise_floor: f64,
     ) -> Result<Box<dyn Stream>> {
+        let Measure { levels, noise_floor, touched_ms } = measure;
         if several.contains(&Self::Duration) {
             return Err(problem!("quantity"; " duration: does not change during a touch; choose another quantity"));
         }
         if several.iter().any(|quantity| quantity.is_local()) {
             array.check_neighbours("a plain rule by local load")?;
         }
-        let tare = if several == [Self::RangeLoad] { None } else { Some(require_tare("plain rule", tare)?) };
+        let needs_none = several == [Self::RangeLoad] && touched_ms.is_none();
+        let tare = if needs_none { None } else { Some(require_tare("plain rule", tare)?) };
         let rest = match tare {
             None => Rest::measured(vec![f64::NO_REST; array.len()]),
             Some(tare) => tare.rest_of(array)?,
@@ -130,6 +143,10 @@ impl Quantity {
         let which = several.iter().filter_map(|quantity| values.iter().position(|value| value == quantity)).collect();
         let emit = Emit::Changes { which, last: vec![f32::NAN; several.len()] };
         let trains = Trains { number: several.len(), kind: SpikeKind::Unsigned, latency_ms: 0.0 };
-        Ok(features::stream(features, rest, emit, array, trains))
+        let touched = match touched_ms {
+            None => None,
+            Some(settling_ms) => Some(Touched::new(settling_ms, loaded()?)),
+        };
+        Ok(features::stream(features, touched, rest, emit, array, trains))
     }
 }

@@ -12,6 +12,7 @@ fn rule() -> PlainRule {
         quiet_ms: 20.0,
         date: Some(0.7),
         constant_ms: -0.1,
+        touched_ms: Some(150.5),
         levels: vec![],
         age_ms: None,
         labels: [Some("contact".to_owned()), None],
@@ -39,7 +40,7 @@ type Spoil = fn(&mut PlainRule);
 
 #[test]
 fn parts_that_make_no_sense_are_refused_by_name() {
-    let cases: [(Spoil, &str); 13] = [
+    let cases: [(Spoil, &str); 14] = [
         (|r| r.level = 0.0, "level is 0"),
         (|r| r.level = f64::NAN, "level is NaN"),
         (|r| r.release = 0.0, "release is 0"),
@@ -47,8 +48,12 @@ fn parts_that_make_no_sense_are_refused_by_name() {
         (|r| r.quiet_ms = -1.0, "quiet_ms is -1"),
         (|r| r.constant_ms = 1e6, "constant_ms is 1000000"),
         (|r| r.date = Some(0.2), "date is 0.2"),
+        (|r| r.touched_ms = Some(-1.0), "touched_ms is -1"),
         (|r| r.age_ms = Some(Age::Ms(-1.0)), "age_ms is -1"),
-        (|r| r.age_ms = Some(Age::Ms(1.0)), "age_ms is given with a release below 1, a quiet time or a date"),
+        (
+            |r| (r.age_ms, r.touched_ms) = (Some(Age::Ms(1.0)), None),
+            "age_ms is given with a release below 1, a quiet time or a date",
+        ),
         (|r| r.noise_floor = f64::INFINITY, "noise_floor is inf"),
         (|r| r.labels = [None, None], "labels are both left out"),
         (|r| r.labels[1] = r.labels[0].clone(), "labels are both contact"),
