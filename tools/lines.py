@@ -51,7 +51,7 @@ BESIDE = {
     "rules": (2_000, "rules/src rules/taxel_rules"),
     "viewers": (120, "viewers/taxel_viewers"),
     "bridge": (150, "bridge/taxel_bridge bridge/zenoh"),
-    "makers": (510, "makers/taxel_makers"),
+    "makers": (850, "makers/taxel_makers"),
     "gait": (3_000, "gait/taxel_gait"),
 }
 PLACES = {

@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats import bags, making
+from refusal import refused
+from shell import call
 
 import taxel
 from taxel import FormatError
+from taxel._base.errors import Place
 from taxel.formats.layout import Layout
 from taxel.reading import Facts, InMemory, Reader
 from taxel.recording.kinds import _from_elsewhere, check_recording, is_recording, kind_of, recordings_in
@@ -135,6 +138,19 @@ def test_a_folder_that_holds_nothing_else_says_what_it_is(write: Write, says: st
     refused = why(lambda: taxel.open_all(tmp_path))
     assert refused == why(lambda: taxel.open(path))
     assert says in str(refused)
+
+
+@pytest.mark.parametrize("name", ["grasp.bag", "grasp.db3", "grasp.mcap", "grasp"])
+def test_a_bag_without_its_reader_names_what_to_install(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("taxel.recording.kinds._from_elsewhere", dict)
+    path = bag(name)(tmp_path)
+    with refused(FormatError, place=Place(name)) as caught:
+        taxel.open(path, topic="/palm")
+    assert "pip install 'taxel[makers,ros]'" in str(caught.value)
+    assert not is_recording(path)
+    assert call(capsys, "info", path)[0] == 2
 
 
 class Distribution:

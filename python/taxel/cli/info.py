@@ -23,7 +23,6 @@ from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._say import in_columns, say
-from taxel.cli._topics import list_topics
 from taxel.cli.app import OUTSIDE, App, Flat
 from taxel.cli.task import Output, progress, say_failures, say_warnings
 from taxel.clock import doubt
@@ -82,9 +81,8 @@ def info(
     each
         Print all facts about each recording of a folder.
     """
-    from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
     from taxel.recording.kinds import is_folder, recordings_in  # noqa: PLC0415
-    from taxel.recording.reading_options import names_topic  # noqa: PLC0415
+    from taxel.recording.reading_options import topics_in  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
     if table is not None and table.suffix.lower() != ".csv":
@@ -97,8 +95,9 @@ def info(
         return _of_files(file, files, partial(_infos, reading, tare), workers, each=each, as_json=as_json)
     with progress(as_json) as show:
         show(f"reading {file}", 0, 0)
-        if file.exists() and is_bag(file) and not names_topic(file, reading.topic, reading.layout):
-            say(*list_topics(file, topics(file, reading.ros), as_json))
+        if file.exists() and (listed := topics_in(file, reading.topic, reading.ros, reading.layout)) is not None:
+            title, rows, facts = listed
+            say(*([json.dumps(facts)] if as_json else [title, *(f"  {row}" for row in in_columns(rows))]))
             return 0
         recordings = reading.open_trials(file)
         recording = recordings[0]

@@ -14,17 +14,16 @@ from cyclopts import Parameter
 
 from taxel._core import ProblemError
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
-from taxel.cli._say import say
-from taxel.cli._topics import list_topics
+from taxel.cli._say import in_columns, say
 from taxel.cli.app import App, Flat, JsonOption, SecondsOption
 from taxel.cli.console import Console
+from taxel.formats.foreign import is_bag
 from taxel.formats.roles import OpenRolesError
-from taxel.formats.ros import is_bag, topics
 from taxel.options import FullReading
 from taxel.panel import Panel
 from taxel.recording import Recording
 from taxel.recording.kinds import is_folder, recordings_in
-from taxel.recording.reading_options import names_topic
+from taxel.recording.reading_options import topics_in
 
 app = App(name="view")
 
@@ -86,10 +85,9 @@ def _opening(
     if not recordings:
         return None
     first = recordings[0]
-    bag = is_bag(first)
-    if bag and not names_topic(first, reading.topic, reading.layout):
-        raise ProblemError(*list_topics(first, topics(first, reading.ros), as_json=False))
-    if not reading.words() and calibration is None and not bag:
+    if (listed := topics_in(first, reading.topic, reading.ros, reading.layout)) is not None:
+        raise ProblemError(listed[0], *(f"  {row}" for row in in_columns(listed[1])))
+    if not reading.words() and calibration is None and not is_bag(first):
         return None
 
     def opens(file: Path) -> list[Recording]:

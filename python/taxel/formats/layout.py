@@ -8,12 +8,12 @@ are listed in docs/files.md.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import finite, flag, integer, mapping, several, shown, text
+from taxel._base.arguments import finite, flag, instance, integer, mapping, several, shown, text
 from taxel._base.documents import of_toml, read_toml
 from taxel._base.errors import refused
 from taxel._base.files import beside, named
@@ -259,6 +259,44 @@ class PrintedFrames:
 
 
 @dataclass(frozen=True)
+class Topics:
+    """Choose the topics of a ROS bag; the arguments are those of `taxel.open`.
+
+    Parameters
+    ----------
+    topic, field : str or list of str, optional
+    ros : str, optional
+    by : str, optional
+        A field whose value says which sensor a message is of: each value is a source; "": all are of one.
+    array : Array or list of Array, optional
+        As of `taxel.open`, which a layout file states by its rows and columns.
+
+    Raises
+    ------
+    ProblemError : a value of another kind
+    """
+
+    topic: str | Sequence[str] | None = None
+    field: str | Sequence[str] | None = None
+    ros: str | None = None
+    by: str | None = None
+    array: Array | Sequence[Array] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("topic", "field", "ros", "by"):
+            for entry in self.entries(name):
+                text(name, entry)
+        for entry in self.entries("array"):
+            instance("array", entry, Array)
+
+    def entries(self, name: str) -> list[Any]:
+        """Return what is given of one of them as a list."""
+        value = getattr(self, name)
+        is_one = isinstance(value, str | Array) or name in ("ros", "by")
+        return [] if value is None else [value] if is_one else [*several(name, value)]
+
+
+@dataclass(frozen=True)
 class Layout:
     """Hold the contents of a layout file.
 
@@ -292,8 +330,8 @@ class Layout:
     data : Data, optional
     source : PrintedFrames, optional
         Source from which its frames are read live.
-    ros : mapping, optional
-        The topic and its options, by the names of the arguments of `taxel.open`.
+    ros : Topics, optional
+        What is read of a ROS bag.
     event_camera : Reduction, optional
         What is read of an event camera's file.
     stated : frozenset of str
@@ -320,7 +358,7 @@ class Layout:
     table: Table | None = None
     data: Data | None = None
     source: PrintedFrames | None = None
-    ros: Mapping[str, Any] = field(default_factory=dict)
+    ros: Topics | None = None
     event_camera: Reduction | None = None
     stated: frozenset[str] = frozenset()
 
@@ -473,7 +511,7 @@ def _values(document: dict[str, Any]) -> dict[str, Any]:
                 inner = {"count_ms" if key == "window_ms" else key: each for key, each in inner.items()}
             _known(name, inner)
             kind = _TABLES[name]
-            needed = [] if kind is dict else [f.name for f in fields(kind) if f.default is f.default_factory is MISSING]
+            needed = [f.name for f in fields(kind) if f.default is f.default_factory is MISSING]
             if missing := [key for key in needed if key not in inner]:
                 raise ProblemError(f"[{name}]: {missing[0]} is missing")
             try:
@@ -492,7 +530,7 @@ _TABLES: dict[str, type[Any]] = {
     "table": Table,
     "data": Data,
     "source": PrintedFrames,
-    "ros": dict,
+    "ros": Topics,
     "event_camera": Reduction,
 }
 
@@ -502,10 +540,9 @@ AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
 
 
 def _known(table: str, values: Mapping[str, Any]) -> None:
-    """Refuse a key that a table has not, "" for those that are in none; the mapping is that of a ROS bag."""
+    """Refuse a key that a table has not, "" for those that are in none."""
     kind = _TABLES[table] if table else Layout
-    own = ["topic", "field", "ros", "by"] if kind is dict else [key.name for key in fields(kind)]
-    names = [name for name in own if name not in ("path", "stated")]
+    names = [key.name for key in fields(kind) if key.name not in ("path", "stated", "array" if kind is Topics else "")]
     unknown = next((name for name in values if name not in names), None)
     if unknown is not None:
         place = f"{table}.{unknown}" if table else unknown

@@ -32,9 +32,9 @@ def of_layout(layout: Layout) -> str:
     own, tables = list[str](), list[str]()
     for key in fields(layout):
         value = getattr(layout, key.name)
-        if key.name in ("path", "stated") or value in (None, "") or value == {}:
+        if key.name in ("path", "stated") or value in (None, ""):
             continue
-        if is_dataclass(value) or isinstance(value, Mapping):
+        if is_dataclass(value):
             tables += ["", f"[{key.name}]", *_lines(value, layout.stated)]
         else:
             own.append(f"{key.name} = {_written(value)}")
@@ -43,8 +43,6 @@ def of_layout(layout: Layout) -> str:
 
 def _lines(values: Any, is_stated: frozenset[str]) -> list[str]:
     """Return the lines of a table of TOML."""
-    if isinstance(values, Mapping):
-        return [f"{key} = {_written(value)}" for key, value in values.items()]
     if isinstance(values, Places):
         columns = {"x": values.x, "y": values.y, "area": values.area}
         lines = [

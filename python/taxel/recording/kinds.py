@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from taxel import _core
 from taxel._base.arguments import checked_path, flag, shown
@@ -22,10 +22,9 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import Reduction
-from taxel.formats.foreign import refuse_container
-from taxel.formats.layout import Layout, Table, advice
+from taxel.formats.foreign import is_bag, refuse_container
+from taxel.formats.layout import Layout, Table, Topics, advice
 from taxel.formats.parts import parts_of
-from taxel.formats.ros import is_bag, read_ros
 from taxel.formats.table import ENDINGS as TABLES
 from taxel.formats.table import read_table
 from taxel.formats.table_form import form_of
@@ -39,6 +38,8 @@ from taxel.recording.stated import check_size
 
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
 GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
+#: Topics in a line for people, in rows below it, and as JSON holds them.
+ListedTopics: TypeAlias = tuple[str, Sequence[Sequence[str]], dict[str, Any]]
 #: Kinds of files of other programs, which a layout may describe.
 FOREIGN = ("table", "arrays")
 #: The endings of those that may be tables of labels.
@@ -68,27 +69,27 @@ class OpenOptions:
         """Selection of the events of a camera."""
         return Reduction(self.region, self.bin, self.count_ms, self.polarity)
 
-    def in_layout(self, path: Path, layout: Layout | None, *, has_size: bool) -> Layout | None:
-        """Return what a layout says with the column of labels, and the size of a sensor that the file may lack."""
-        full = layout or Layout(path)
-        if self.label_column is not None:
-            full = replace(full, table=replace(full.table or Table(), label_column=self.label_column))
-        if has_size and isinstance(self.array, Array):
-            full = replace(full, rows=self.array.rows, columns=self.array.columns, places=None)
-        return layout if full == Layout(path) else full
-
-    def check(self, path: Path, kind: str, *, has_labels: bool) -> None:
-        """Refuse what is only for files of another kind.
+    def in_layout(self, path: Path, layout: Layout | None, kind: Kind) -> Layout | None:
+        """Return what a layout says with what is given: topics, the column of labels, a size that the file may lack.
 
         Raises
         ------
-        ProblemError : topics of a file that is no ROS bag, or what is read of a camera's events for one of a maker
+        ProblemError : what is only for files of another kind
         """
         flag("differences", self.differences)
-        if kind != "ros" and not self.topic is self.field is self.ros is None:
+        full, names = layout or Layout(path), ("topic", "field", "ros", "array")
+        given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        if getattr(kind, "topics", None) is not None:
+            full = replace(full, ros=replace(full.ros or Topics(), **given)) if given else full
+        elif not given.keys() <= {"array"}:
             raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
-        if self.label_column is not None and not has_labels:
+        if self.label_column is not None and not getattr(kind, "has_labels", False):
             raise refused("label_column", f" is {shown(self.label_column)}: is only for tables; {path} is none")
+        if self.label_column is not None:
+            full = replace(full, table=replace(full.table or Table(), label_column=self.label_column))
+        if getattr(kind, "has_size", False) and isinstance(self.array, Array):
+            full = replace(full, rows=self.array.rows, columns=self.array.columns, places=None)
+        return layout if full == Layout(path) else full
 
 
 @dataclass(frozen=True)
@@ -107,12 +108,15 @@ class Kind:
         Whether it has columns of labels, of which one is the label_column in the [table] of the layout.
     has_size : bool, optional
         Whether a file may lack the size of its sensor, which the layout then has.
+    topics : function of a path and of a release of ROS, or None, optional
+        Returns what `[ros]` of the layout chooses from.
     """
 
     knows: Callable[[Path], bool]
     read: Callable[[Path, Layout | None], Sequence[Reader]]
     has_labels: bool = False
     has_size: bool = False
+    topics: Callable[[Path, str | None], ListedTopics] | None = None
 
 
 def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
@@ -131,12 +135,6 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
         readers = read_table(path, layout or Layout(path), array)
         return [_on_given(each, array) for each in readers]
 
-    def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        grid = layout.grid() if how.array is None and layout is not None else how.array
-        stated = {} if layout is None else layout.ros
-        given = {name: getattr(how, name) for name in ("topic", "field", "ros") if getattr(how, name) is not None}
-        return read_ros(path, grid, **{**stated, **given})
-
     def read_events(path: Path, layout: Layout | None) -> Sequence[Reader]:
         return [read_records(path, layout.grid() if array is None and layout is not None else array)]
 
@@ -147,7 +145,6 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
         return read_arrays(path, layout) if is_foreign else [read_columns(path, array)]
 
     yield from {
-        "ros": Kind(is_bag, read_bag),
         "lsa": Kind(_ending(".lsa"), lambda path, _: [read_lsa(path, array, differences=how.differences)]),
         "mcap": Kind(_is_mcap, lambda path, _: read_mcap(path)),
         "h5": Kind(is_h5_of_taxel, lambda path, _: [read_columns(path, array)]),
@@ -180,8 +177,8 @@ def _ending(*endings: str) -> Callable[[Path], bool]:
 
 
 def _is_mcap(path: Path) -> bool:
-    """Return whether a file is a .mcap by its ending or its first bytes."""
-    if not path.is_file():
+    """Return whether a file is a .mcap by its ending or its first bytes; one of ROS is a bag."""
+    if not path.is_file() or is_bag(path):
         return False
     with open(path, "rb") as file:
         return path.suffix.lower() == ".mcap" or file.read(8) == b"\x89MCAP0\r\n"
@@ -221,6 +218,24 @@ def _on_given(reader: InMemory, array: Array | None) -> Reader:
         check_size(reader.facts.path, stated.shape, array)
     says_more = array.shape != stated.shape or (array._is_measured and not stated._is_measured)
     return replace(reader, data=table._on(replace(array, names=array.names or stated.names))) if says_more else reader
+
+
+def known(path: Path, options: OpenOptions | None = None) -> tuple[str, Kind]:
+    """Return the format of a file or a folder with its name.
+
+    Raises
+    ------
+    FormatError : no format knows it, or it is empty
+    OSError : the path is not there, or cannot be read
+    """
+    path.stat()
+    found = next(((name, kind) for name, kind in kinds(options) if kind.knows(path)), None)
+    if found is None:
+        raise unknown(path)
+    # A recorder's file has begun.
+    if path.is_file() and found[0] not in ("lsa", "mcap") and not path.stat().st_size:
+        raise _empty(path)
+    return found
 
 
 def kind_of(path: Path) -> str | None:
@@ -263,11 +278,8 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
     ------
     FormatError : no recording; an invalid layout file; a table or arrays that can be read in two ways
     """
-    found, kind = layout_of(path, layout), kind_of(path)
-    if kind is None:
-        raise unknown(path)
-    refuse_empty(path, kind)
-    match kind:
+    found = layout_of(path, layout)
+    match known(path)[0]:
         case "mcap":
             _core.RecordingReader(path)
         case "csv":
@@ -362,12 +374,6 @@ def unknown(path: Path) -> FormatError:
     return FormatError(
         f"{path}, byte 0: starts with {begins}: not a recording; taxel reads {', '.join(ENDINGS)}; {describes}"
     )
-
-
-def refuse_empty(path: Path, kind: str) -> None:
-    """Refuse a file without a byte, but for those of a recorder, which has begun."""
-    if path.is_file() and kind not in ("lsa", "mcap") and not path.stat().st_size:
-        raise _empty(path)
 
 
 def _empty(path: Path) -> FormatError:

@@ -17,9 +17,8 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.formats.checks import check_table
 from taxel.formats.event_camera import Reduction, reduced
-from taxel.formats.foreign import refuse_container
+from taxel.formats.foreign import is_bag, refuse_container
 from taxel.formats.layout import Layout
-from taxel.formats.ros import is_bag
 from taxel.labels import Labels, trial_of
 from taxel.reading import ENDINGS, InMemory, Reader
 from taxel.recording.beside import LABELS, labels_for
@@ -31,12 +30,10 @@ from taxel.recording.kinds import (
     files_in,
     is_folder,
     kind_of,
-    kinds,
+    known,
     layout_of,
     natural_order,
     recordings_in,
-    refuse_empty,
-    unknown,
 )
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView
@@ -190,15 +187,9 @@ def _named(opened: Sequence[Recording], name: Path) -> list[tuple[Path, Recordin
 
 def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
     """Open a file, a ROS bag, or a folder of a maker by its layout; each trial is a recording."""
-    kind = kind_of(path)
-    if kind is None:
-        raise unknown(path)
-    refuse_empty(path, kind)
-    found = next(each for name, each in kinds(options) if name == kind)
-    options.check(path, kind, has_labels=getattr(found, "has_labels", False))
-    before = path.stat()
+    kind, before = known(path, options)[1], path.stat()
     try:
-        readers = found.read(path, options.in_layout(path, layout, has_size=getattr(found, "has_size", False)))
+        readers = kind.read(path, options.in_layout(path, layout, kind))
     except MemoryError:
         raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
     after = path.stat()

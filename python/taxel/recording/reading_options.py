@@ -10,7 +10,8 @@ from typing import Any
 from taxel._base.arguments import checked_path, several, text
 from taxel._base.errors import refused
 from taxel.array import Array, of_size
-from taxel.formats.layout import Layout
+from taxel.formats.foreign import is_bag
+from taxel.recording.kinds import ListedTopics, known, layout_of
 from taxel.recording.opening import open_all
 from taxel.recording.recording import Recording
 from taxel.recording.stated import is_row_of, on_array
@@ -50,10 +51,18 @@ def open_trials(
     return [recording if rate_hz is None else recording.at_rate(rate_hz) for recording in placed]
 
 
-def names_topic(bag: Path, topic: object, layout: str | os.PathLike[str] | None) -> bool:
-    """Return whether options, or the layout file of a ROS bag, say which topic to open."""
-    stated = layout or Layout.beside(bag)
-    return bool(topic) or (stated is not None and "topic" in Layout.read(Path(stated)).ros)
+def topics_in(path: Path, topic: object, ros: str | None, layout: str | os.PathLike[str] | None) -> ListedTopics | None:
+    """Return the topics of a ROS bag if none is chosen; None of other files.
+
+    Raises
+    ------
+    FormatError, ImportError, ProblemError : as of opening it
+    """
+    if topic or not is_bag(path):
+        return None
+    stated, listed = layout_of(path, layout), getattr(known(path)[1], "topics", None)
+    chosen = None if stated is None or stated.ros is None else stated.ros.topic
+    return None if chosen or listed is None else listed(path, ros)
 
 
 def _on_array(recording: Recording, sizes: Sequence[str]) -> Recording:

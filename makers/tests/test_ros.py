@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import mixed
+from formats import bags
+from formats.bags import BEGIN_NS, HAND, PALM, SKIN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shell import call
 
 import taxel
 from taxel import FormatError, ProblemError
-from taxel.formats import ros
+from taxel.formats.foreign import is_bag
 from taxel.options import FullReading
 from taxel.tasks.labels import references
-
-from . import bags
-from .bags import BEGIN_NS, HAND, PALM, SKIN
+from taxel_makers import ros
 
 PALM_ARRAY = taxel.Array(24, 32)
 IMAGE = "sensor_msgs/msg/Image"
@@ -228,7 +228,7 @@ def test_a_bag_that_was_cut_off_says_what_makes_it_whole(tmp_path: Path) -> None
 def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> None:
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "own.mcap")
-    assert not ros.is_bag(tmp_path / "own.mcap")
+    assert not is_bag(tmp_path / "own.mcap")
     assert taxel.open(tmp_path / "own.mcap").events == events
     with pytest.raises(ProblemError, match=r"own\.mcap: is not a ROS bag; topic, field and ros are only for ROS bags"):
         taxel.open(tmp_path / "own.mcap", topic="/palm")

@@ -18,25 +18,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base import arguments
-from taxel._base.columns import frozen_whole
-from taxel._base.errors import helped, refused, unreadable
-from taxel._base.messages import counted, first_line, installing, warn
-from taxel._core import Error, FormatError, ProblemError
-from taxel.array import Array
+from taxel import Array, Error, FormatError, Frames, ProblemError
 from taxel.formats.column_names import says
+from taxel.formats.foreign import is_bag
+from taxel.formats.layout import Layout, Topics
 from taxel.formats.roles import FIRST, Role
 from taxel.formats.times import repaired
-from taxel.frames import Frames
 from taxel.labels import source_of
-from taxel.reading import Facts, InMemory, Reader
+from taxel.reading import Facts, InMemory, Reader, helped, refused, unreadable, warn
+from taxel.recording.kinds import Kind, ListedTopics
 
-__all__ = ["Topic", "is_bag", "read_ros", "topics"]
-
-#: The first bytes of a .bag and of a .db3, which is a database of SQLite.
-_ROS1, _SQLITE = b"#ROSBAG V", b"SQLite format 3\0"
-#: The first bytes of a .mcap: its magic and the code of the header, before the header's length and its profile.
-_MCAP = b"\x89MCAP0\r\n\x01"
 #: So many different texts are names of sensors.
 _KEYS = 16
 #: So many messages of a topic are looked at for numbers.
@@ -66,23 +57,6 @@ _PIXELS = {
 }
 
 
-def is_bag(path: Path) -> bool:
-    """Return whether a path is a ROS bag, by its content.
-
-    Raises
-    ------
-    OSError : the file is not there, or cannot be read
-    """
-    if path.is_dir():
-        return (path / "metadata.yaml").is_file()
-    with open(path, "rb") as file:
-        head = file.read(64)
-    if head.startswith(_MCAP):
-        profile = head[len(_MCAP) + 8 :]
-        return profile[4 : 4 + int.from_bytes(profile[:4], "little")] in (b"ros1", b"ros2")
-    return head.startswith((_ROS1, _SQLITE))
-
-
 @contextmanager
 def _open_bag(path: Path, ros: str | None) -> Iterator[Any]:
     """Open a bag as an `AnyReader` of rosbags; `ros` is the release whose types a bag without definitions has."""
@@ -90,8 +64,8 @@ def _open_bag(path: Path, ros: str | None) -> Iterator[Any]:
         from rosbags.highlevel import AnyReader  # noqa: PLC0415  an extra
         from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
     except ImportError:
-        text = f"to read a ROS bag, taxel needs rosbags, which is not installed: {installing('ros')}"
-        raise ImportError(f"{path}: {text}") from None
+        how = "which is not installed: pip install 'taxel[ros]'"
+        raise ImportError(f"{path}: to read a ROS bag, taxel needs rosbags, {how}") from None
     stores = {store.value.partition("_")[2]: store for store in Stores if "_" in store.value}
     if ros is not None and ros not in stores:
         raise refused("ros", f" is {ros}: must be one of {', '.join(stores)}")
@@ -103,7 +77,7 @@ def _open_bag(path: Path, ros: str | None) -> Iterator[Any]:
     # Damaged files raise errors of rosbags' parts: of struct, of SQLite, of YAML, of bz2, of zstd; and a damaged size
     # asks for more memory than is available.
     except Exception as error:
-        why = "it needs more memory than is available" if isinstance(error, MemoryError) else first_line(error)
+        why = "it needs more memory than is available" if isinstance(error, MemoryError) else _first_line(error)
         if "type definitions" in why:
             why = f"it has no definitions of its messages; give ros, one of {', '.join(stores)}"
         elif "index" in why.lower() and path.suffix == ".bag":
@@ -111,6 +85,11 @@ def _open_bag(path: Path, ros: str | None) -> Iterator[Any]:
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
             why = "the end of the file is missing; to repair it, run mcap recover"
         raise unreadable(f"cannot be read as a ROS bag: {why}", path) from None
+
+
+def _first_line(error: BaseException) -> str:
+    """Return the first line of an error."""
+    return str(error).partition("\n")[0] or type(error).__name__
 
 
 def _type(value: Any) -> str:
@@ -244,6 +223,29 @@ def topics(path: Path, ros: str | None = None) -> list[Topic]:
         return [each for name in names for each in _of_topic(bag, name)]
 
 
+def list_topics(path: Path, ros: str | None = None) -> ListedTopics:
+    """Return the topics that hold numbers, and which options open one of them.
+
+    Raises
+    ------
+    ImportError, FormatError, ProblemError : as of `topics`
+    """
+    found = topics(path, ros)
+    facts = {"file": str(path), "kind": "ros", "topics": [asdict(topic) for topic in found]}
+    if not found:
+        return f"{path}: this ROS bag has no topic with numbers", [], facts
+    rows = [("topic", "field", "shape", "numbers", "messages", "rate", "type")]
+    for topic in found:
+        shape = " x ".join(map(str, topic.shape)) or "-"
+        rate = "-" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz"
+        kind = topic.type + f": {topic.trouble}" * bool(topic.trouble)
+        rows.append((topic.topic, topic.field or "-", shape, topic.dtype or "-", str(topic.messages), rate, kind))
+    # An id is no skin: most numbers are.
+    named = max(found, key=lambda topic: (not topic.trouble, math.prod(topic.shape)))
+    more = f" --field {named.field}" * bool(named.field) + " --array ROWSxCOLUMNS" * (len(named.shape) < 2)
+    return f"{path}: ROS bag; open a topic by --topic {named.topic}{more}", rows, facts
+
+
 def _of_topic(bag: Any, topic: str) -> Iterator[Topic]:
     """Yield the fields of a topic by the first message that has numbers; the bag's index counts all."""
     connections = [connection for connection in bag.connections if connection.topic == topic]
@@ -278,12 +280,9 @@ def _last(bag: Any, connections: Sequence[Any], begin: int) -> int:
         before *= 4
 
 
-def _chosen(
-    topic: object, field: object, array: Array | Sequence[Array] | None
-) -> list[tuple[str, str | None, Array | None]]:
+def _chosen(how: Topics) -> list[tuple[str, str | None, Array | None]]:
     """Return each topic with its field and its array; a single one is that of all."""
-    given = {"topic": _listed("topic", topic, str), "field": _listed("field", field, str)}
-    given["array"] = _listed("array", array, Array)
+    given = {name: how.entries(name) for name in ("topic", "field", "array")}
     count = max(map(len, given.values()))
     for name, listed in given.items():
         if len(listed) not in (0, 1, count):
@@ -291,13 +290,6 @@ def _chosen(
             raise refused(name, f"{times}; must be given once, or once for each source")
     every = (listed * count if len(listed) == 1 else listed or [None] * count for listed in given.values())
     return list(zip(*every, strict=True))
-
-
-def _listed(name: str, value: Any, kind: type[Any]) -> list[Any]:
-    """Return what is given of a kind as a list."""
-    entries = [] if value is None else [value] if isinstance(value, kind) else arguments.several(name, value)
-    check = arguments.text if kind is str else lambda name, entry: arguments.instance(name, entry, Array)
-    return [check(name, entry) for entry in entries]
 
 
 class _Message(NamedTuple):
@@ -313,24 +305,10 @@ class _Message(NamedTuple):
     texts: tuple[Any, ...]
 
 
-def read_ros(
-    path: Path,
-    array: Array | Sequence[Array] | None = None,
-    *,
-    topic: str | Sequence[str] | None = None,
-    field: str | Sequence[str] | None = None,
-    ros: str | None = None,
-    by: str | None = None,
-) -> list[Reader]:
-    """Return a reader of each chosen topic of a ROS bag, and of each value of the field `by`.
+def read(path: Path, layout: Layout | None = None) -> list[Reader]:
+    """Return a reader of each topic that `[ros]` of a layout chooses, and of each value of its field `by`.
 
-    Parameters
-    ----------
-    path : Path
-    array, topic, field, ros
-        As of `taxel.open`.
-    by : str, optional
-        A field whose value says which sensor a message is of: each value is a source; "": all are of one.
+    Messages that do not state rows and columns have those of the layout.
 
     Raises
     ------
@@ -338,13 +316,14 @@ def read_ros(
     FormatError : no topic is chosen; damaged; no such topic or field; no message of the array's length
     ProblemError : an unknown release; more fields than topics
     """
-    if not topic:
+    how = (None if layout is None else layout.ros) or Topics()
+    grid = None if layout is None else layout.grid()
+    how = replace(how, array=grid) if how.array is None and grid is not None else how
+    if not how.topic:
         right = "choose one of its topics, or write [ros] in a layout file"
         error = FormatError(f"{path}: is a ROS bag; {right}; to list the topics, run taxel info {path}")
         raise helped(error, "topic", "give")
-    chosen = _chosen(topic, field, array)
-    for name, value in (("ros", ros), ("by", by)):
-        arguments.optional(arguments.text, name, value)
+    chosen, ros, by = _chosen(how), how.ros, how.by
     names = [name for name, _, _ in chosen]
     found: dict[str, Reader] = {}
     with _open_bag(path, ros) as bag:
@@ -416,10 +395,10 @@ def _readers(
     try:
         array = array or Array(*shape, name=topic, names=names or None)
     except ProblemError as error:
-        raise FormatError(f"{location}: {shape} values each: {first_line(error)}") from None
+        raise FormatError(f"{location}: {shape} values each: {_first_line(error)}") from None
     name = source_of(f"{topic}.{field}" if is_named else topic)
     short = len(messages) - len(fits)
-    said = [f"{short} of {counted(len(messages), 'message')} are left out, of another length"] * bool(short)
+    said = [f"{short} of {_counted(messages)} are left out, of another length"] * bool(short)
     for key in dict.fromkeys(message.key for message in fits):
         of_key = [message for message in fits if message.key == key]
         facts = Facts(
@@ -527,6 +506,11 @@ def _refuse_mixed(location: str, names: Sequence[str], texts: Sequence[Sequence[
             raise FormatError(f"{location}: the messages are of {', '.join(known[:4])} in turn ({name}): {right}")
 
 
+def _counted(messages: Sequence[_Message]) -> str:
+    """Return how many messages there are, for people."""
+    return f"{len(messages)} message{'s' * (len(messages) != 1)}"
+
+
 def _shape(whole: Sequence[_Message]) -> tuple[int, int]:
     """Return rows and columns of the most frequent number of values: as most messages state them, else one row."""
     ((size, _),) = Counter(message.values.size for message in whole).most_common(1)
@@ -548,13 +532,15 @@ def _reader(location: str, facts: Facts, messages: Sequence[_Message], said: Seq
     if are_few or right.mean() < _MOST or found.wrong > (1 - _MOST) * len(messages):
         found, by_the_bag = repaired(bag // 1000), len(messages)
     frames = frames if found.order is None else frames[found.order]
-    wrong = f"{by_the_bag} of {counted(len(messages), 'message')} have the time of the bag: their stamps are wrong"
+    wrong = f"{by_the_bag} of {_counted(messages)} have the time of the bag: their stamps are wrong"
     said = [*said, *[wrong] * bool(stamps.any() and by_the_bag), *found.said]
     for line in said:
         warn(f"{location.partition(', field ')[0]}: {line}", stacklevel=6)
     unit = "counts" if rows.dtype.kind in "ui" else "as sent"
-    values = frozen_whole(frames.reshape(-1, *facts.array.shape))
-    table = Frames(values, frozen_whole(found.t), unit=unit, array=facts.array)
+    table = Frames(frames.reshape(-1, *facts.array.shape), found.t, unit=unit, array=facts.array)
     remarks = () if stamps.any() else ("the times are those of the bag, because the messages have no header",)
     counts = {"messages": len(messages), "messages_of_another_length": short, "times_by_the_bag": by_the_bag}
     return InMemory(replace(facts, remarks=remarks, lost=(*said, *facts.lost)), table, counted=counts)
+
+
+ROS = Kind(is_bag, read, topics=list_topics)
