@@ -2,8 +2,9 @@
 
 A file ``NAME.regions.json`` holds the regions of a recording: ``{"unit": "mm", "regions": [{"name": "heel",
 "rectangle": [0, 0, 40, 60]}, {"name": "toes", "polygon": [[0, 200], [40, 200], [20, 260]]}, {"name": "hallux",
-"taxels": [[3, 41], [4, 41]]}]}``. Places are x to the right and y downwards, as `Array.positions` has them: in mm, in
-"places" (the unit of places without one), or in "taxels" (columns and rows of a grid); taxels are column and row.
+"taxels": [[3, 41], [4, 41]]}]}``; of several sensors each region names its own, ``"source": "left"``. Places are x to
+the right and y downwards, as `Array.positions` has them: in mm, in "places" (the unit of places without one), or in
+"taxels" (columns and rows of a grid); taxels are column and row.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,8 @@ class Region:
         Column and row of each taxel; empty for a polygon.
     unit : {"mm", "places", "taxels"}
         The unit of the corners.
+    source : str
+        Which sensor of a recording of several it is of, and its places count from; "": the only one.
 
     Raises
     ------
@@ -58,11 +61,13 @@ class Region:
     corners: tuple[tuple[float, float], ...] = ()
     taxels: tuple[tuple[int, int], ...] = ()
     unit: str = "mm"
+    source: str = ""
 
     def __post_init__(self) -> None:
         if not text("name", self.name):
             raise refused("name", " is '': must be the region's name")
         text("unit", self.unit, UNITS)
+        text("source", self.source)
         corners, taxels = (_pairs(f"region {self.name}", pairs) for pairs in (self.corners, self.taxels))
         if bool(len(corners)) == bool(len(taxels)):
             raise ProblemError(f"region {self.name}: must have either corners or taxels")
@@ -150,9 +155,9 @@ class Region:
 
     def to_json(self) -> dict[str, Any]:
         """Return the region as JSON holds it, without its unit."""
-        if self.taxels:
-            return {"name": self.name, "taxels": [list(taxel) for taxel in self.taxels]}
-        return {"name": self.name, "polygon": [list(corner) for corner in self.corners]}
+        kind, places = ("taxels", self.taxels) if self.taxels else ("polygon", self.corners)
+        of_source = {"source": self.source} if self.source else {}
+        return {"name": self.name, **of_source, kind: [list(place) for place in places]}
 
 
 def read_regions(path: str | os.PathLike[str]) -> tuple[Region, ...]:
@@ -176,15 +181,16 @@ def read_regions(path: str | os.PathLike[str]) -> tuple[Region, ...]:
         try:
             match one:
                 case {"rectangle": [left, top, right, bottom]}:
-                    found.append(Region.rectangle(name, left, top, right, bottom, unit))
+                    region = Region.rectangle(name, left, top, right, bottom, unit)
                 case {"polygon": corners}:
-                    found.append(Region(name, corners, unit=unit))
+                    region = Region(name, corners, unit=unit)
                 case {"taxels": taxels}:
-                    found.append(Region(name, taxels=taxels, unit=unit))
+                    region = Region(name, taxels=taxels, unit=unit)
                 case _:
                     raise ProblemError(
                         f"region {name}: must have rectangle (left, top, right, bottom), polygon or taxels"
                     )
+            found.append(replace(region, source=one.get("source", "")))
         except ProblemError as error:
             raise unreadable(str(error), path) from None
         if name in {region.name for region in found[:-1]}:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from matplotlib.path import Path as Outline
 import taxel
 from taxel import Array, FormatError, Frames, Places, ProblemError, Region
 from taxel.cli import main
+from taxel.reading import Facts, InMemory
 
 GRID = Array(12, 9, (5.0, 7.0))
 
@@ -204,3 +206,27 @@ def test_info_writes_the_load_of_each_region(tmp_path, capsys):
     assert facts["left, half"]["peak_kPa"] == 50
     # Four of nine columns have their middle in it, and the fifth on its border.
     assert facts["left, half"]["at_range_end_taxels"] == 4 * 12
+
+
+def test_of_several_sensors_each_region_is_measured_on_its_source(tmp_path, capsys):
+    feet = []
+    for name, most in (("left", 20), ("right", 50)):
+        frames = Frames(np.full((2, 12, 9), most, np.float32), [0, 1000], unit="kPa", array=GRID)
+        feet.append(InMemory(Facts(path=tmp_path, array=GRID, label=name), frames))
+    taxel.convert(taxel.Recording.of(*feet), tmp_path / "walk.mcap")
+    heel = Region.rectangle("heel", -3.5, -2.5, 28, 57.5)
+    of = [replace(heel, name=f"{name} heel", source=name) for name in ("left", "right")]
+    taxel.write_regions(tmp_path / "walk.regions.json", of)
+    assert taxel.read_regions(tmp_path / "walk.regions.json") == tuple(of)
+    arguments = ["info", str(tmp_path / "walk.mcap"), "--regions", str(tmp_path / "walk.regions.json")]
+    with pytest.raises(SystemExit):
+        main([*arguments, "--json"])
+    sources = json.loads(capsys.readouterr().out)["sources"]
+    for name, most in (("left", 20), ("right", 50)):
+        regions = sources[name]["pressure"]["regions"]
+        assert set(regions) == {"whole", f"{name} heel"}
+        assert regions[f"{name} heel"]["force_N"] == pytest.approx(most * 31.5 * 60 / 1000)
+    taxel.write_regions(tmp_path / "walk.regions.json", [heel], overwrite=True)
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert "region heel: its source is ''" in capsys.readouterr().err

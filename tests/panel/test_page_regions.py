@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,9 @@ from tests.panel.pages import press, shown, shows, until
 
 import taxel
 from taxel import Array, Frames, Region
-from taxel.panel.regions import Drawn, RegionLoads
+from taxel.panel.regions import Drawn, Measure, RegionLoads
+from taxel.reading import Facts, InMemory
+from taxel.recording import Recording
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -24,7 +27,7 @@ TOES = Region("toes", taxels=((2, 0), (3, 0)))
 @pytest.fixture
 def walk(tmp_path: Path) -> Path:
     """Two seconds of frames with a load that wanders, with two regions beside them."""
-    values = np.random.default_rng(2).random((100, *ARRAY.shape)) * 90
+    values = np.random.default_rng(2).random((100, *ARRAY.shape)) * 90 - 30
     frames = Frames(values, 500_000 + np.arange(100) * 20_000, unit="kPa", array=ARRAY)
     taxel.convert(frames, tmp_path / "walk.npz")
     taxel.write_regions(tmp_path / "walk.regions.json", [HEEL, TOES])
@@ -33,12 +36,20 @@ def walk(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("column_us", [4_000, 64_000])
 @pytest.mark.parametrize("region", [HEEL, TOES, Region("slanted", ((0, 0), (30, 20), (5, 90)))])
-def test_a_curve_is_the_force_of_a_region_in_columns_of_time(walk: Path, region: Region, column_us: int) -> None:
+@pytest.mark.parametrize(
+    ("measure", "name", "unit"),
+    [("load", "force_N", "N"), ("peak", "peak_kPa", "kPa"), ("mean", "mean_kPa", "kPa"), ("area", "area_mm2", "mm²")],
+)
+def test_a_curve_is_a_measure_of_a_region_in_columns_of_time(
+    walk: Path, region: Region, column_us: int, measure: Measure, name: str, unit: str
+) -> None:
     recording = taxel.open(walk)
     frames = recording.frames()
-    force = frames.region(region)["force_N"]
+    force = np.nan_to_num(frames.region(region)[name])
     first = 480_000 // column_us
-    curve = RegionLoads(recording, 1).curve(region, first, 600, column_us)
+    loads = RegionLoads(walk.name, {"": recording}, 1)
+    curve = loads.curve(region, measure, first, 600, column_us)
+    assert loads.units[measure] == unit
     for number, found in enumerate(curve, first):
         start, stop = number * column_us, (number + 1) * column_us
         inside = (frames.t >= start) & (frames.t < stop)
@@ -56,8 +67,8 @@ def test_a_region_without_a_curve_has_the_reason_instead_and_others_keep_theirs(
     crossing = Drawn("crossing", [(0, 0), (30, 30), (30, 0), (0, 30)], [])
     beside = Drawn("beside", [(90, 0), (99, 0), (99, 9)], [])
     missing = Drawn("missing", [], [(8, 0)])
-    *reasons, curve = RegionLoads(taxel.open(walk), 1).curves(
-        [crossing, beside, missing, Drawn("toes", [], list(TOES.taxels))], 8, 1, 64_000
+    *reasons, curve = RegionLoads("walk", {"": taxel.open(walk)}, 1).curves(
+        [crossing, beside, missing, Drawn("toes", [], list(TOES.taxels))], "load", 8, 1, 64_000
     )
     assert all(name in str(reason) for name, reason in zip(("crossing", "beside", "missing"), reasons, strict=True))
     assert all(isinstance(reason, str) for reason in reasons)
@@ -149,3 +160,112 @@ def moves(page: Any) -> None:
     assert _corners(page, 2) == pytest.approx(np.array(before) + np.array([5, 10]), abs=0.5)
     page.locator("#region-undo").click()
     assert _corners(page, 2) == pytest.approx(np.array(before), abs=0.1)
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> Path:
+    """Two insoles of 10 mm, whose frames come at other times and for other lengths."""
+    values = np.random.default_rng(3).random((2, 100, 6, 4)) * 90
+    feet = []
+    for k, name in enumerate(("left", "right")):
+        frames = Frames(values[k], np.arange(100) * (20_000 - 3000 * k), unit="kPa", array=Array(6, 4, pitch_mm=10.0))
+        feet.append(InMemory(Facts(path=tmp_path, array=frames.array, label=name), frames))
+    taxel.convert(Recording.of(*feet), tmp_path / "pair.mcap")
+    return tmp_path / "pair.mcap"
+
+
+def test_of_several_sensors_each_region_is_of_its_own(pair: Path) -> None:
+    sources = taxel.open(pair).sources
+    loads = RegionLoads("pair", sources, 1)
+    heel = replace(Region.rectangle("heel", 5, 25, 25, 55), source="left")
+    toes = Region("toes", taxels=((1, 0), (2, 0)), source="right")
+    left, right = loads.drawn([heel, toes])
+    # The right one begins behind the left one's four columns and an empty one.
+    assert (left["corners"], right["taxels"]) == (heel.corners, ((6, 0), (7, 0)))
+    drawn = [Drawn(one["name"], list(one["corners"]), list(one["taxels"])) for one in (left, right)]
+    assert loads.regions(drawn) == [heel, toes]
+    force = sources["right"].frames().region(toes)["force_N"]
+    *_, second = loads.curves(drawn, "load", 0, 2, 1_000_000)
+    # The right one's last frame is at 1.683 s; what comes then is not known.
+    assert second[1] == pytest.approx((force[58:].min(), force[58:].max()), abs=1e-3)
+    with pytest.raises(taxel.ProblemError, match="both: lies on several sensors"):
+        loads.regions([Drawn("both", [], [(3, 0), (5, 0)])])
+    with pytest.raises(taxel.ProblemError, match=r"heel: its source is '': must be one of left, right"):
+        loads.drawn([replace(heel, source="")])
+
+
+def test_a_picture_has_the_largest_and_mean_values_isobars_and_the_path_of_each_sensor(pair: Path) -> None:
+    sources = taxel.open(pair).sources
+    found = RegionLoads("pair", sources, 1).picture("maximum", 200_000, 400_000)
+    right = sources["right"].frames().between(187_000, 400_000)
+    values = np.reshape(found["values"], (6, 9))
+    assert values[:, 5:] == pytest.approx(right.maximum(), abs=1e-3)
+    assert not values[:, 4].any()
+    shown = [point for point in found["paths"][1] if point is not None]
+    path = dict(zip(right.t.tolist(), np.add(right.centre(), (50, 0)), strict=True))
+    assert {t for t, *_ in shown} >= set(path) - {187_000}
+    for t, *at in shown:
+        assert at == pytest.approx(path[max(known for known in path if known <= t)], abs=1e-2)
+
+
+def test_isobars_of_a_cone_are_circles_around_its_tip(tmp_path: Path) -> None:
+    x, y = np.meshgrid(np.arange(41), np.arange(41))
+    cone = np.maximum(0, 100 - 5 * np.hypot(x - 20, y - 20))
+    taxel.convert(
+        Frames([cone, cone / 2], [0, 10_000], unit="kPa", array=Array(41, 41, pitch_mm=2.0)), tmp_path / "c.npz"
+    )
+    loads = RegionLoads("c", {"": taxel.open(tmp_path / "c.npz")}, 1)
+    for kind, most in (("maximum", 100), ("mean", 75)):
+        found = loads.picture(kind, 0, 20_000)
+        assert max(found["values"]) == pytest.approx(most)
+        # At 20, 40, 60 and 80 % of the height the radius is 80, 60, 40 and 20 % of 40 mm.
+        for line, radius in zip(found["isobars"], (32, 24, 16, 8), strict=True):
+            assert np.hypot(*(np.array(line) - 40).T) == pytest.approx(radius, abs=0.3)
+
+
+#: How many pieces a path of the drawing has.
+PIECES = "name => (document.querySelector(`#picture-lines .${name}`).getAttribute('d').match(/M/g) ?? []).length"
+
+
+def test_the_page_shows_pictures_and_measures_of_several_sensors_and_writes_each_region_with_its_own(
+    chromium: Any, pair: Path
+) -> None:
+    with shown(chromium, pair, width=390) as page:
+        press(page, "5")
+        page.locator("#region-rectangle").click()
+        page.evaluate("scrollTo(0, 0)")
+        box = page.locator("#pressure-map").bounding_box()
+        # Columns 5 to 8 are the right one's.
+        at = [(box["x"] + box["width"] * x / 9, box["y"] + box["height"] * y / 6) for x, y in ((5.5, 1), (8, 4))]
+        page.mouse.move(*at[0])
+        page.mouse.down()
+        page.mouse.move(*at[1])
+        page.mouse.up()
+        frames = taxel.open(pair).sources["right"].frames()
+        for measure, name, unit in (("peak", "peak_kPa", "kPa"), ("area", "area_mm2", "mm²"), ("load", "force_N", "N")):
+            page.locator("#region-measure").select_option(measure)
+            until(lambda unit=unit: _output(page, 0).endswith(f" {unit}"), measure)
+            page.locator("#region-write").click()
+            if page.locator("#region-replace").is_visible():
+                page.locator("#region-replace").click()
+            until(pair.with_name("pair.regions.json").exists, "the file")
+            (region,) = taxel.read_regions(pair.with_name("pair.regions.json"))
+            assert region.source == "right"
+            found = frames.region(region)[name]
+            assert np.isclose(found, float(_output(page, 0).split()[0].replace(",", "")), rtol=0.01).any()
+        for kind in ("mean", "maximum"):
+            page.locator("#picture").select_option(kind)
+            shows(page, "pressure-above", r"^0\.000 s to 1\.980 s$")
+            until(lambda: page.evaluate(PIECES, "isobars") > 3, "isobars")
+            assert page.evaluate(PIECES, "path") == 2
+            assert page.locator("#picture-marks span").all_inner_texts() == ["0 %", "25 %", "50 %", "75 %", "100 %"] * 2
+        page.locator("#pressure-frame").focus()
+        page.keyboard.press("ArrowRight")
+        # The crosshair begins in the middle, where there is none between both: at the right one's first column.
+        shows(page, "taxel-name", r"^(left|right), row \d, column \d$")
+        source, row, column = page.locator("#taxel-name").inner_text().split(", ")
+        values = taxel.open(pair).sources[source].frames().maximum()
+        most = values[int(row.split()[1]), int(column.split()[1])]
+        shows(page, "taxel-value", rf"^{most:.3g} kPa$")
+        page.locator("#picture").select_option("")
+        until(lambda: page.evaluate(PIECES, "isobars") == 0, "what is now")

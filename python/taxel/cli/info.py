@@ -102,9 +102,9 @@ def info(
         recordings = reading.open_trials(file)
         recording = recordings[0]
         if len(recordings) > 1 or len(recording.sources) > 1:
-            if table is not None or regions is not None:
+            if table is not None or (regions is not None and len(recordings) > 1):
                 raise ProblemError(_several(file, recordings))
-            infos = [taxel.tasks.info(each, tare) for each in recordings]
+            infos = [taxel.tasks.info(each, tare, parts, range_end) for each in recordings]
             of_each = [found.facts for found in infos]
             say(*_of_several(file, of_each, as_json=as_json, each=each))
             if are_trials(recordings) and not as_json:

@@ -1,27 +1,39 @@
-"""Regions of a recording that the page shows: their file, and the curve of each in columns of time."""
+"""Regions and pictures of what the page shows: curves in columns of time, isobars, the path of the centre, the file."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import isnan
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from contourpy import contour_generator
 from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from taxel._base.errors import refused
 from taxel._base.files import beside, named
 from taxel._core import ProblemError
-from taxel.frames import Frames
+from taxel.array import Array
 from taxel.panel.declared import line
 from taxel.recording import Recording
 from taxel.recording.analysis.pressure import above_rest
 from taxel.regions import Region, read_regions, write_regions
 
-#: Corners or taxels of a region.
-_MOST_PLACES = 10_000
+#: Corners or taxels of a region, and points of a path.
+_MOST_PLACES, _MOST_POINTS = 10_000, 2000
+#: A path is where the sum is above a share of its largest.
+_LEAST = 0.02
+#: Isobars, as shares of the largest value of a picture.
+_LEVELS = (0.2, 0.4, 0.6, 0.8)
+
+Measure = Literal["load", "peak", "mean", "area"]
+Picture = Literal["maximum", "mean"]
+#: Least and greatest in columns of time; None where nothing is known.
+Curve = list[tuple[float, float] | None]
 
 
 class Drawn(Struct, forbid_unknown_fields=True):
@@ -32,41 +44,91 @@ class Drawn(Struct, forbid_unknown_fields=True):
     taxels: Annotated[list[tuple[int, int]], Meta(max_length=_MOST_PLACES)]
 
 
+class _Part(NamedTuple):
+    """Where a sensor lies in the array that is shown: its columns, and how far it was moved, in the `centre_unit`."""
+
+    columns: slice
+    x: float
+
+
 class RegionLoads:
-    """Give the force of regions, or the sum of their values, of frames above rest: as `Frames.region` does.
+    """Measure regions and pictures of loaded taxels above rest: as `Frames.region` does.
 
     Parameters
     ----------
-    recording : Recording
-        Of frames of one sensor.
+    name : str
+        Of the recording.
+    sensors : dict from str to Recording
+        Those that are shown side by side.
     us : int
         How long one us of the file is in the view.
 
     Raises
     ------
-    ProblemError : several sensors, or no frame
+    ProblemError : a sensor without a frame
     """
 
-    def __init__(self, recording: Recording, us: int) -> None:
-        found = None if recording.is_several or recording.has_events else above_rest(recording)
-        if found is None or not len(found[0]):
-            raise ProblemError(f"{recording.path.name}: regions need frames of one sensor")
-        frames, above, _ = found
-        self.array = frames.array
-        force = frames._in_n
-        self.unit, self.above = frames.unit if force is None else "N", above
-        areas = np.ones(self.array.shape) if force is None else np.asarray(self.array.area_mm2) * force
-        # Taxel after taxel, so that a region reads only its own.
-        loads = _loaded(frames, above) * areas.astype(np.float32)
-        self._loads = np.ascontiguousarray(loads.transpose(1, 2, 0))
-        self._t = frames.t * us
+    def __init__(self, name: str, sensors: Mapping[str, Recording], us: int) -> None:
+        read = [above_rest(sensor) for sensor in sensors.values()]
+        found = [one for one in read if one is not None and len(one[0])]
+        if len(found) < len(sensors):
+            raise ProblemError(f"{name}: regions need frames, or events with intensities")
+        arrays = [frames.array for frames, *_ in found]
+        self.array, lefts = Array._beside(arrays, gap=1)
+        self._parts = {
+            sensor: _Part(slice(left, left + array.columns), _moved(self.array, array, left))
+            for sensor, left, array in zip(sensors, lefts, arrays, strict=True)
+        }
+        t = np.unique(np.concatenate([frames.t for frames, *_ in found]))
+        # Taxel after taxel, so that a region reads only its own; 0: not loaded, NaN: not known.
+        self._values = np.zeros((*self.array.shape, len(t)), np.float32)
+        for (frames, above, _), part in zip(found, self._parts.values(), strict=True):
+            held = np.searchsorted(frames.t, t, side="right") - 1
+            loaded = np.where(frames._loaded(above), frames.values, np.float32(0)).transpose(1, 2, 0)
+            known = (held >= 0) & (t <= frames.t[-1])
+            self._values[: frames.array.rows, part.columns] = np.where(known, loaded[..., held], np.nan)
+        self._t, self._unit, areas = t * us, found[0][0].unit, self.array.area_mm2
+        self._areas, self._in_n = np.ones(self.array.shape) if areas is None else areas, found[0][0]._in_n
+        self.units = {
+            "load": "N" if self._in_n else self._unit,
+            "peak": self._unit,
+            "mean": self._unit,
+            "area": "taxels" if areas is None else "mm²",
+        }
 
-    def curve(self, region: Region, first: int, count: int, column_us: int) -> list[tuple[float, float] | None]:
-        """Return least and greatest load in columns of time; None where there is no frame.
+    def _over(self, weights: NDArray[np.float64], part: slice, *, loaded: bool = False) -> NDArray[np.float32]:
+        """Return the sum of values by their weights, or of the weights of loaded taxels, over time."""
+        total = np.zeros(len(self._t[part]), np.float32)
+        for weight, values in zip(weights.astype(np.float32), self._values, strict=True):
+            if len(there := np.flatnonzero(weight)):
+                taxels = slice(there[0], there[-1] + 1)
+                row = values[taxels, part]
+                total += weight[taxels] @ ((row > 0).astype(np.float32) if loaded else row)
+        return total
+
+    def _measured(self, region: Region, measure: Measure, part: slice) -> NDArray[np.float32]:
+        """Return a measure of a region over time; 0 where nothing is loaded."""
+        shares = region.shares(self.array)
+        if measure == "peak":
+            inside = self._values[region.centred(self.array), part]
+            return np.asarray(inside.max(axis=0, initial=0))
+        areas = shares * self._areas
+        if measure == "load":
+            return self._over(areas * self._in_n if self._in_n else shares, part)
+        area = self._over(areas, part, loaded=True)
+        # What is not known is so of each measure.
+        values = self._over(areas, part)
+        whole = np.where(np.isnan(values), np.nan, area) if measure == "area" else values
+        return whole if measure == "area" else np.divide(values, area, out=whole, where=area > 0)
+
+    def curve(self, region: Region, measure: Measure, first: int, count: int, column_us: int) -> Curve:
+        """Return least and greatest of a measure in columns of time; None where there is no frame.
 
         Parameters
         ----------
         region : Region
+            In the array that is shown.
+        measure : {"load", "peak", "mean", "area"}
         first, count : int
             The number of the first column, which begins at that many times its width, and how many there are.
         column_us : int
@@ -75,7 +137,6 @@ class RegionLoads:
         ------
         ProblemError : a region that does not fit the array
         """
-        shares = region.shares(self.array).astype(np.float32)
         starts = np.arange(first, first + count, dtype=np.int64) * column_us
         # A frame holds until the next one.
         begin = np.searchsorted(self._t, starts, side="right") - 1
@@ -85,56 +146,139 @@ class RegionLoads:
             return [None] * count
         begin, end = np.maximum(begin[known], 0), end[known]
         low, high = int(begin[0]), int(end[-1])
-        load = np.zeros(high - low, np.float32)
-        for share, loads in zip(shares, self._loads, strict=True):
-            if len(inside := np.flatnonzero(share)):
-                part = slice(inside[0], inside[-1] + 1)
-                load += share[part] @ loads[part, low:high]
+        measured = self._measured(region, measure, slice(low, high))
         # Pairs of begin and end; what is between an end and the next begin is left out.
         pairs = np.stack([begin - low, end - low], axis=1).ravel()
-        padded = np.append(load, load[-1:])
-        least, greatest = (of.reduceat(padded, pairs)[::2].astype(float) for of in (np.minimum, np.maximum))
-        found = iter(zip(np.round(least, 4).tolist(), np.round(greatest, 4).tolist(), strict=True))
+        padded = np.append(measured, measured[-1:])
+        ends = (np.round(of.reduceat(padded, pairs)[::2].astype(float), 4).tolist() for of in (np.fmin, np.fmax))
+        found = iter([None if isnan(least) else (least, most) for least, most in zip(*ends, strict=True)])
         return [next(found) if is_known else None for is_known in known]
 
     def curves(
-        self, drawn: Sequence[Drawn], first: int, count: int, column_us: int
-    ) -> list[list[tuple[float, float] | None] | str]:
+        self, drawn: Sequence[Drawn], measure: Measure, first: int, count: int, column_us: int
+    ) -> list[Curve | str]:
         """Return the curve of each region; of one that does not fit, or is none, the reason."""
-        found: list[list[tuple[float, float] | None] | str] = []
+        found: list[Curve | str] = []
         for one in drawn:
             try:
-                found.append(self.curve(self.regions([one])[0], first, count, column_us))
+                found.append(self.curve(self._region(one), measure, first, count, column_us))
             except ProblemError as error:
                 found.append(str(error))
         return found
 
-    def regions(self, drawn: Sequence[Drawn]) -> list[Region]:
-        """Return regions of the page."""
+    def picture(self, kind: Picture, start_us: int, stop_us: int) -> dict[str, Any]:
+        """Return the largest or the mean value of each taxel over a time, isobars, and the path of the centre.
+
+        Returns
+        -------
+        dict
+            `values`, row after row; `isobars`, on a grid: corners of each line; `paths` of each sensor: time (us), x
+            and y, None where nothing is loaded. Places are in the array's `centre_unit`.
+        """
+        begin = max(0, int(np.searchsorted(self._t, start_us, side="right")) - 1)
+        part = slice(begin, max(int(np.searchsorted(self._t, stop_us)), begin + 1))
+        values = self._values[..., part]
+        # What is not known counts in neither.
+        picture = np.fmax.reduce(values, axis=-1)
+        if kind == "mean":
+            picture = np.nansum(values, axis=-1) / np.maximum(1, np.count_nonzero(~np.isnan(values), axis=-1))
+        picture, has_path = np.nan_to_num(picture).astype(float), self.array.centre_unit is not None
+        return {
+            "values": np.round(picture.ravel(), 4).tolist(),
+            "isobars": self._isobars(picture) if has_path and self.array.places is None else [],
+            "paths": [self._path(one.columns, part) for one in self._parts.values()] if has_path else [],
+        }
+
+    def _isobars(self, picture: NDArray[np.float64]) -> list[list[list[float]]]:
+        # Beyond its edges a sensor bears nothing.
+        (rows, columns), (across, down) = self.array.shape, self._steps()
+        x, y = np.arange(-1, columns + 1) * across, np.arange(-1, rows + 1) * down
+        lines, most = contour_generator(x, y, np.pad(picture, 1)), float(picture.max(initial=0.0))
+        found = [np.asarray(one) for level in _LEVELS for one in lines.lines(level * most)] if most > 0 else []
+        return [np.round(one, 2).tolist() for one in found]
+
+    def _steps(self) -> tuple[float, float]:
+        """Return the distance of columns and rows of a grid, in its `centre_unit`."""
+        array = self.array
+        return (1.0, 1.0) if array.pitch_mm is None else (array.column_mm, array.row_mm)
+
+    def _path(self, columns: slice, part: slice) -> list[tuple[int, float, float] | None]:
+        """Return the path of the centre of a sensor, as of `Frames.centre_path`."""
+        places = np.stack([one[:, columns].ravel() for one in self.array.positions()])
+        values = self._values[:, columns, part].reshape(places.shape[1], -1)
+        total = values.sum(axis=0, dtype=np.float64)
+        is_loaded = total > _LEAST * np.nanmax(total, initial=0.0)
+        path = np.nan_to_num(places).astype(np.float32) @ values / np.where(is_loaded, total, np.nan)
+        some = slice(None, None, 1 + len(total) // _MOST_POINTS)
+        points = zip(self._t[part][some].tolist(), *np.round(path[:, some], 3).tolist(), strict=True)
+        return [None if isnan(x) else (t, x, y) for t, x, y in points]
+
+    def _scaled(self, region: Region) -> Region:
+        """Return a region whose corners are in the array's `centre_unit`, where a file has columns and rows."""
+        if region.unit != "taxels" or self.array.places is not None:
+            return region
+        across, down = self._steps()
+        corners = tuple((x * across, y * down) for x, y in region.corners)
+        return replace(region, corners=corners, unit=self.array.centre_unit or "taxels")
+
+    def _region(self, drawn: Drawn) -> Region:
+        """Return a region in the array that is shown."""
         unit = self.array.centre_unit or "taxels"
-        return [Region(one.name, tuple(one.corners), tuple(one.taxels), unit) for one in drawn]
+        return Region(drawn.name, tuple(drawn.corners), tuple(drawn.taxels), unit)
+
+    def regions(self, drawn: Sequence[Drawn]) -> list[Region]:
+        """Return regions of the page as a file has them: of several sensors each of its own.
+
+        Raises
+        ------
+        ProblemError : a region that does not fit the array, or lies on several sensors
+        """
+        found = []
+        for region in map(self._region, drawn):
+            columns = np.flatnonzero(region.shares(self.array).any(axis=0))
+            source = next(
+                (s for s, one in self._parts.items() if {*columns} <= {*range(one.columns.start, one.columns.stop)}),
+                None,
+            )
+            if source is None:
+                raise ProblemError(f"region {region.name}: lies on several sensors; draw one on each")
+            found.append(
+                replace(_shifted(region, self._parts[source], -1), source=source if len(self._parts) > 1 else "")
+            )
+        return found
 
     def drawn(self, regions: Sequence[Region]) -> list[dict[str, Any]]:
         """Return regions as the page has them.
 
         Raises
         ------
-        ProblemError : a region that does not fit the array
+        ProblemError : a region that does not fit the array, or names none of its sensors
         """
-        unit, pitch = self.array.centre_unit, self.array.pitch_mm
         found = []
+        only = next(iter(self._parts)) if len(self._parts) == 1 else ""
         for region in regions:
-            region.shares(self.array)
-            in_taxels = bool(region.corners) and region.unit == "taxels" != unit and pitch is not None
-            x, y = (self.array.column_mm, self.array.row_mm) if in_taxels else (1.0, 1.0)
-            corners = [(a * x, b * y) for a, b in region.corners]
-            found.append({"name": region.name, "corners": corners, "taxels": region.taxels})
+            source = region.source or only
+            if source not in self._parts:
+                known = ", ".join(self._parts)
+                raise ProblemError(f"region {region.name}: its source is {source!r}: must be one of {known}")
+            on = _shifted(self._scaled(region), self._parts[source], 1)
+            on.shares(self.array)
+            found.append({"name": on.name, "corners": on.corners, "taxels": on.taxels})
         return found
 
 
-def _loaded(frames: Frames, above: float) -> NDArray[np.float32]:
-    """Return the values of the loaded taxels, and 0 for the others."""
-    return np.where(frames._loaded(above), frames.values, np.float32(0))
+def _moved(shown: Array, array: Array, left: int) -> float:
+    """Return how far a sensor was moved to the right where it is shown, in the `centre_unit`."""
+    if shown.places is not None and array.places is not None:
+        there = array._there()
+        return float((shown.places.x[: array.rows, left : left + array.columns][there] - array.places.x[there])[0])
+    return left * (1.0 if shown.pitch_mm is None else shown.column_mm)
+
+
+def _shifted(region: Region, part: _Part, sign: int) -> Region:
+    """Return a region moved to where its sensor is shown, or back."""
+    corners = tuple((x + sign * part.x, y) for x, y in region.corners)
+    return replace(region, corners=corners, taxels=tuple((x + sign * part.columns.start, y) for x, y in region.taxels))
 
 
 def regions_beside(recording: Path) -> Path:

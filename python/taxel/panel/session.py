@@ -24,7 +24,7 @@ from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
 from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
-from taxel.panel.regions import Drawn, RegionLoads, read_beside, regions_beside, write_beside
+from taxel.panel.regions import Drawn, Measure, Picture, RegionLoads, read_beside, regions_beside, write_beside
 from taxel.panel.shown_files import judged
 from taxel.panel.threads import in_thread
 
@@ -474,24 +474,34 @@ class Session:
         shown, loads = await self._loads()
         found = loads.drawn(await in_thread(read_beside, shown.path))
         file = regions_beside(shown.path).name
-        await self.say({"type": "regions", "source": shown.name, "file": file, "unit": loads.unit, "regions": found})
+        await self.say({"type": "regions", "source": shown.name, "file": file, "units": loads.units, "regions": found})
 
     @long_request
     async def loads(
         self,
         regions: Annotated[list[Drawn], Meta(max_length=_MOST_REGIONS)],
+        measure: Measure,
         first: Annotated[int, whole(-(2**52), 2**52)],
         count: Annotated[int, whole(1, _MOST_COLUMNS)],
         column_us: Annotated[int, whole(1, 2**40)],
     ) -> None:
-        """Send `loads`: least and greatest load of each region in columns of time, of which the first is `first`.
+        """Send `loads`: least and greatest of a measure of each region in columns of time; the first is `first`.
 
         Column k begins at k times its width. The load is the force, or the sum of the values where no force is known.
         """
         shown, loads = await self._loads()
-        curves = await in_thread(loads.curves, regions, first, count, column_us)
+        curves = await in_thread(loads.curves, regions, measure, first, count, column_us)
         begin = {"type": "loads", "source": shown.name, "first": first, "count": count, "column_us": column_us}
-        await self.say(begin | {"curves": curves})
+        await self.say(begin | {"measure": measure, "curves": curves})
+
+    @long_request
+    async def picture(self, kind: Picture, start_us: Time, stop_us: Time) -> None:
+        """Send `picture`: the largest or the mean values of a time, isobars, and the path of the centre."""
+        shown, loads = await self._loads()
+        found = await in_thread(loads.picture, kind, start_us, stop_us)
+        await self.say(
+            {"type": "picture", "source": shown.name, "kind": kind, "start_us": start_us, "stop_us": stop_us, **found}
+        )
 
     @request
     async def write_regions(

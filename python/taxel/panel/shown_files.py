@@ -279,7 +279,7 @@ class ShownFiles:
         with self._loading:
             if self._loads is None or self._loads[0] != key:
                 self._loads = None
-                self._loads = key, RegionLoads(self.opened(path, trial)[0], us)
+                self._loads = key, RegionLoads(path.name, _sources(self.opened(path, trial)[0]), us)
             return self._loads[1]
 
     def cut(self, path: Path, trial: str | None, out: Path, start_us: int, stop_us: int) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from taxel._base.arguments import finite, instance, optional, several
 from taxel._base.messages import collected, counted
+from taxel._core import ProblemError
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -65,7 +66,7 @@ def info(
         The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning.
         Default: that of a quiet stretch.
     regions : sequence of Region
-        Those whose load is measured too, of a recording of one sensor.
+        Those whose load is measured too; of several sensors each on its source.
     range_end : float, in the recording's unit, optional
         The value at which the range of a taxel ends: how many of each region reach it is counted.
 
@@ -85,12 +86,18 @@ def info(
     """
     instance("recording", recording, Recording)
     parts = [instance("regions", region, Region) for region in several("regions", regions)]
+    end, names = optional(finite, "range_end", range_end), [*recording.sources]
+    for region in parts:
+        if region.source not in (names if len(names) > 1 else ["", *names]):
+            raise ProblemError(
+                f"region {region.name}: its source is {region.source!r}: must be one of {', '.join(names)}"
+            )
     with collected() as warnings:
-        if len(recording.sources) > 1:
-            found = Info(_sources(recording, tare), None)
+        if len(names) > 1:
+            found = Info(_sources(recording, tare, parts, end), None)
         else:
             given = None if tare is None else rest(recording, tare)
-            pressed = series(recording, given, parts, optional(finite, "range_end", range_end))
+            pressed = series(recording, given, parts, end)
             found = Info(summary(recording, pressed), pressed)
     return replace(found, warnings=tuple(warnings))
 
@@ -116,13 +123,16 @@ def sensor_lines(recording: Recording) -> Iterator[str]:
         yield f"sensor: {'; '.join(parts)} (taxel info lists them)"
 
 
-def _sources(recording: Recording, tare: GivenTare | None) -> dict[str, Any]:
+def _sources(
+    recording: Recording, tare: GivenTare | None, parts: Sequence[Region], end: float | None
+) -> dict[str, Any]:
     """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
     name_of_first, first = next(iter(recording.sources.items()))
     ours, sources = first.clock, {}
     for name, source in recording.sources.items():
         given = None if tare is None or source.is_stream else rest(source, tare)
-        facts = summary(source, None if source.is_stream else series(source, given))
+        own = [region for region in parts if region.source == name]
+        facts = summary(source, None if source.is_stream else series(source, given, own, end))
         if source.is_stream:
             facts["columns"] = source.columns
         clock = source.clock

@@ -3,7 +3,7 @@
 import { part } from "./dom.js";
 import { bindKeys } from "./keys.js";
 import { failed, notify } from "./notice.js";
-import { showTab } from "./tabs.js";
+import { showTab, TABS } from "./tabs.js";
 
 /**
  * The parts of the page that actions concern.
@@ -68,8 +68,8 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     last: () => (player.transport.source === null ? player.follow() : player.reach && player.seek(player.reach[1])),
     faster: () => player.faster(1),
     slower: () => player.faster(-1),
-    zoomIn: () => window.halve(),
-    zoomOut: () => window.double(),
+    zoomIn: () => window.scale(0.5),
+    zoomOut: () => window.scale(2),
     second: () => cursor.second(),
     showAll: () => window.showAll(),
     live: () => player.follow(),
@@ -86,11 +86,7 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     crosshair: () => part("pressure-frame", HTMLElement).focus(),
     zeroAll,
     health,
-    tabBoard: () => showTab("board"),
-    tabRecord: () => showTab("record"),
-    tabLabels: () => showTab("labels"),
-    tabTrain: () => showTab("train"),
-    tabView: () => showTab("view"),
+    tab: ({ key }) => showTab(TABS[Number(key) - 1]),
     theme,
     help: () => help.showModal(),
   });
@@ -102,6 +98,6 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
   onClick("help-close", () => help.close());
   onClick("zero", zero);
   onClick("zero-all", zeroAll);
-  onClick("zoom-in", () => window.halve());
-  onClick("zoom-out", () => window.double());
+  onClick("zoom-in", () => window.scale(0.5));
+  onClick("zoom-out", () => window.scale(2));
 }

@@ -1,6 +1,7 @@
 // The board: its registers, presets.
 
 import { make, part, write } from "./dom.js";
+import { failed } from "./notice.js";
 import { RefusedError } from "./server.js";
 import { integer } from "./words.js";
 
@@ -91,13 +92,9 @@ class Control {
 
 /** The tab of the board. */
 export class Board {
-  /**
-   * @param {Server} server
-   * @param {(error: unknown) => void} failed
-   */
-  constructor(server, failed) {
+  /** @param {Server} server */
+  constructor(server) {
     this.server = server;
-    this.failed = failed;
     this.writable = false;
     /** Whether the live source is a board. */
     this.hasRegisters = true;
@@ -112,15 +109,10 @@ export class Board {
       this.server.request({ type: "preset_apply", name: this.select.value }).catch((error) => {
         // The board still has another version.
         this.showPresets();
-        this.failed(error);
+        failed(error);
       });
     };
-    part("read-back", HTMLButtonElement).onclick = () => this.ask({ type: "read" });
-  }
-
-  /** @param {import("./messages.js").Request} message */
-  ask(message) {
-    return this.server.request(message).catch(this.failed);
+    part("read-back", HTMLButtonElement).onclick = () => server.ask({ type: "read" });
   }
 
   /** @param {Hello} hello */

@@ -50,6 +50,13 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** Makes an element of a drawing. @template {keyof SVGElementTagNameMap} T @param {T} tag @param {Record<string, string | number>} attributes */
+export function drawing(tag, attributes) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+  return element;
+}
+
 /**
  * Gives an element so many children; those that it has stay.
  * @template {HTMLElement} T

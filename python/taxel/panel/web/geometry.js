@@ -200,21 +200,16 @@ class Placed extends Sensor {
     return Math.min(1 / this.extent[0], 1 / this.aspect / this.extent[1]);
   }
 
-  /** @param {number} x @param {number} y @returns {[number, number]} shares of width and height */
-  share(x, y) {
-    const scale = this.scaled();
-    return [0.5 + (x - this.from[0] - this.extent[0] / 2) * scale, 0.5 + (y - this.from[1] - this.extent[1] / 2) * scale * this.aspect];
-  }
-
   /** @param {Taxel} taxel @returns {[number, number]} */
   place([x, y]) {
     const taxel = y * this.columns + x;
-    return this.share(this.places.x[taxel], this.places.y[taxel]);
+    return this.seen([this.places.x[taxel], this.places.y[taxel]]);
   }
 
   /** @param {Place} place @returns {[number, number]} where it is seen, in shares of width and height */
   seen([x, y]) {
-    return this.share(x, y);
+    const scale = this.scaled();
+    return [0.5 + (x - this.from[0] - this.extent[0] / 2) * scale, 0.5 + (y - this.from[1] - this.extent[1] / 2) * scale * this.aspect];
   }
 
   /** @param {number} across @param {number} down shares of width and height @returns {Place} */
@@ -238,7 +233,7 @@ class Placed extends Sensor {
   at(across, down) {
     let [least, nearest] = [Infinity, 0];
     for (const taxel of this.taxels) {
-      const [x, y] = this.share(this.places.x[taxel], this.places.y[taxel]);
+      const [x, y] = this.seen([this.places.x[taxel], this.places.y[taxel]]);
       const distance = Math.hypot((x - across) * this.aspect, y - down);
       if (distance < least) [least, nearest] = [distance, taxel];
     }
@@ -275,7 +270,7 @@ class Placed extends Sensor {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     for (const taxel of this.taxels) {
-      const [across, down] = this.share(places.x[taxel], places.y[taxel]);
+      const [across, down] = this.seen([places.x[taxel], places.y[taxel]]);
       const [x, y] = [across * width, down * height];
       const side = unit * (places.area ? Math.sqrt(places.area[taxel]) : DOT * near);
       context.fillStyle = css(words[taxel]);

@@ -34,11 +34,7 @@ export const KEYS = [
   { keys: ["c"], shown: "C", text: "go to the pressure map: arrow keys move the crosshair, Escape hides it", action: "crosshair" },
   { keys: ["0"], shown: "0", text: "zero all: use the present values as the rest", action: "zeroAll" },
   { keys: ["d"], shown: "D", text: "look for dead, stuck and noisy taxels", action: "health" },
-  { keys: ["1"], shown: "1", text: "tab Board", action: "tabBoard" },
-  { keys: ["2"], shown: "2", text: "tab Record", action: "tabRecord" },
-  { keys: ["3"], shown: "3", text: "tab Labels", action: "tabLabels" },
-  { keys: ["4"], shown: "4", text: "tab Train", action: "tabTrain" },
-  { keys: ["5"], shown: "5", text: "tab View", action: "tabView" },
+  { keys: ["1", "2", "3", "4", "5"], shown: "1 to 5", text: "tab Board, Record, Labels, Train or View", action: "tab" },
   { keys: ["t"], shown: "T", text: "theme: dark, light or the system’s", action: "theme" },
   { keys: ["?"], shown: "?", text: "show this list", action: "help" },
 ];

@@ -2,7 +2,7 @@
 
 import { paintAs } from "./colours.js";
 import { entitle, make, part, withChildren, write } from "./dom.js";
-import { notify, silence } from "./notice.js";
+import { failed, notify, silence } from "./notice.js";
 import { counted, listedTime, numbering, readTime, seconds, timeUnit } from "./words.js";
 
 /** @typedef {import("./messages.js").LabelRow} Label */
@@ -36,15 +36,13 @@ export class Labels {
    * @param {Settings} settings
    * @param {Player} player
    * @param {() => Timeline | null} timeline
-   * @param {(error: unknown) => void} failed
    * @param {() => void} shown called to bring the tab to the front
    * @param {(file: string) => void} counted called when the number of a recording's labels may have changed
    */
-  constructor(server, settings, player, timeline, failed, shown, counted) {
+  constructor(server, settings, player, timeline, shown, counted) {
     this.server = server;
     this.player = player;
     this.timeline = timeline;
-    this.failed = failed;
     this.shown = shown;
     this.counted = counted;
     /** @type {Map<string, { path: string, labels: Label[] }>} by recording */
@@ -152,7 +150,7 @@ export class Labels {
   /** Takes back the last change of labels that was made in this window. */
   undo() {
     silence(this.offered);
-    this.server.request({ type: "undo" }).then(() => notify("undid the last change of labels"), this.failed);
+    this.server.request({ type: "undo" }).then(() => notify("undid the last change of labels"), failed);
   }
 
   /** Puts a label in the place of another or of none, and chooses it; the next change is one of it. @param {Label | null} old @param {Label} wanted */
@@ -162,7 +160,7 @@ export class Labels {
     this.change([{ old, new: wanted }]).catch((error) => {
       if (this.chosen === wanted) this.chosen = before;
       this.edited = null;
-      this.failed(error);
+      failed(error);
       this.show();
     });
   }
@@ -179,7 +177,7 @@ export class Labels {
     const time = part("chosen-time", HTMLInputElement).value;
     const t_us = readTime(time);
     if (Number.isFinite(t_us)) return this.alter({ label: part("chosen-name", HTMLInputElement).value.trim(), t_us });
-    this.failed(new Error(`${time} is not a number of ${timeUnit()}`));
+    failed(new Error(`${time} is not a number of ${timeUnit()}`));
     this.edited = null;
     return this.show();
   }
@@ -187,7 +185,7 @@ export class Labels {
   /** @param {Label} gone */
   remove(gone) {
     if (this.isChosen(gone)) this.chosen = null;
-    this.change([{ old: gone }]).then(() => this.offerUndo(`deleted ${gone.label} at ${seconds(gone.t_us)}`), this.failed);
+    this.change([{ old: gone }]).then(() => this.offerUndo(`deleted ${gone.label} at ${seconds(gone.t_us)}`), failed);
   }
 
   /** Says what was changed, and offers to take it back. @param {string} text */

@@ -185,10 +185,10 @@ export const LANES = [
     at: ({ sums: { step } }, timeline, column) => timeline.drawn.flatMap((curve) => ends(timeline.sumIn(column, curve), step)),
   },
   {
-    name: "regions", label: "Force of each region, or sum of its values",
+    name: "regions", label: "Force, pressure or area of each region",
     fits: ({ regions }) => regions.all.length > 0,
     heading: ({ regions }) => [
-      make("b", {}, regions.unit === "N" ? "Force of regions" : "Sum of regions"),
+      make("b", {}, `${regions.quantity} of regions`),
       ...regions.all.flatMap(({ name }, k) => {
         const colour = swatch("");
         colour.style.background = regionColour(k);

@@ -14,6 +14,7 @@ import { Maps } from "./maps.js";
 import { Mistakes } from "./mistakes.js";
 import { Notes } from "./notes.js";
 import { failed, notify, silence } from "./notice.js";
+import { Picture } from "./picture.js";
 import { Player } from "./player.js";
 import { readFrame } from "./protocol.js";
 import { Pointed } from "./pointed.js";
@@ -51,7 +52,7 @@ const GAP_FRAMES = 3;
 const settings = new Settings();
 const fragment = new URLSearchParams(location.hash.slice(1));
 const server = new Server(fragment.get("token") ?? "", receive, receiveFrame, showConnection);
-const player = new Player(server, failed);
+const player = new Player(server);
 const detections = new Detections((t_us) => player.seek(t_us));
 const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.columns_us ?? null, () => {
   lanesDue = true;
@@ -59,10 +60,11 @@ const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.c
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const pointed = new Pointed(server, () => timeline);
 const maps = new Maps(settings, watch);
+const picture = new Picture(server, maps, () => timeline, player, () => (mapsDue = true));
 // Their curves are drawn at once, while a border is dragged.
 const regions = new Regions(server, maps, () => timeline, () => timeline && lanes.draw(timeline, timeWindow.ticks(timeline), "regions"), showLanes);
 const lanes = new Lanes(settings, shown);
-const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
+const labels = new Labels(server, settings, player, () => timeline, () => showTab("labels"), listRecordings);
 const notes = new Notes(player, labels);
 const mistakes = new Mistakes(player, () => {
   lanesDue = true;
@@ -70,12 +72,12 @@ const mistakes = new Mistakes(player, () => {
 const training = new Training(server, player, mistakes, () => showDetections(detections.shown, detections.labels));
 divide(settings);
 new ResizeObserver(() => (lanesDue = true)).observe(part("lanes", HTMLElement));
-const board = new Board(server, failed);
+const board = new Board(server);
 const sensor = new Sensor(server);
 const roles = new Roles(server, (name) => ask(name));
 part("roles-button", HTMLButtonElement).onclick = () => opened && roles.open(opened.name);
-const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
-const recorder = new Recorder(server, failed, () => showTab("record"));
+const view = new View(server, settings, (taxel) => maps.point(taxel));
+const recorder = new Recorder(server, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
 /** @type {Timeline | null} */
@@ -187,7 +189,7 @@ function receiveFrame(buffer) {
   timeline.put(frame);
   timeWindow.follow(frame);
   if (followed !== frame.following) timeWindow.ask();
-  maps.take(frame);
+  maps.frame = frame;
   player.t_us = frame.t_us;
   if (frame.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
   mapsDue = timeDue = true;
@@ -266,6 +268,8 @@ function receive(message) {
       return roles.see(message);
     case "regions":
       return regions.take(message);
+    case "picture":
+      return picture.take(message);
     case "loads":
       return regions.takeLoads(message);
     case "cut":
@@ -325,6 +329,7 @@ function turnTo(shown) {
   silence();
   maps.forget();
   regions.choose(shown);
+  picture.choose(shown?.frames != null);
 }
 
 /** Asks for a recording, or for a trial of it; says so while it is read. @param {string} name @param {string} [trial] */
@@ -459,6 +464,7 @@ function drawFrame(now_ms) {
         const ticks = timeWindow.ticks(timeline);
         lanes.draw(timeline, ticks);
         regions.ask();
+        picture.ask();
         timeWindow.writeAxis(ticks);
       }
       labels.arrange();

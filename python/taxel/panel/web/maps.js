@@ -113,6 +113,8 @@ export class Maps {
     this.zeroed = [];
     /** @type {Frame | null} */
     this.frame = null;
+    /** A picture of a time in place of what is now: ticks above rest, and what it is of. @type {{ values: Float32Array, words: string } | null} */
+    this.picture = null;
     this.pressureScale = new Scale(20);
     /** Ticks of the full colour. */
     this.top = this.pressureScale.top;
@@ -188,27 +190,24 @@ export class Maps {
     this.mark();
   }
 
-  /** @param {Frame} frame */
-  take(frame) {
-    this.frame = frame;
-  }
-
   /**
    * Draws the last frame.
    * @param {number} now_ms
    */
   draw(now_ms) {
-    const { frame, rows, columns, floor } = this;
+    const { frame, rows, columns, floor, picture } = this;
     const { exists } = this.geometry;
     if (!frame?.pressure || !frame.rest || frame.rows !== rows || frame.columns !== columns) return;
     const { pressure, change, rest } = frame;
+    const isUnknown = (/** @type {number} */ i) => !picture && pressure[i] === UNKNOWN_VALUE;
+    const above = (/** @type {number} */ i) => (picture ? picture.values[i] : rest[i] === UNKNOWN_VALUE ? 0 : pressure[i] - rest[i]);
     let most = 0;
     let moved = 0;
     for (let i = 0; i < pressure.length; i++) {
-      if (pressure[i] !== UNKNOWN_VALUE && rest[i] !== UNKNOWN_VALUE) most = Math.max(most, pressure[i] - rest[i]);
+      if (!isUnknown(i)) most = Math.max(most, above(i));
       if (change) moved = Math.max(moved, Math.abs(change[i]));
     }
-    const scale = this.settings.values.top / this.values.step || this.pressureScale.held(most, now_ms);
+    const scale = this.settings.values.top / this.values.step || (picture ? most || 1 : this.pressureScale.held(most, now_ms));
     this.top = scale;
     const changes = this.changeScale.held(moved, now_ms);
     const ground = UNKNOWN[this.settings.theme].map(word);
@@ -222,13 +221,10 @@ export class Maps {
           onPressure[from] = onChange[from] = 0;
           continue;
         }
-        if (pressure[from] === UNKNOWN_VALUE) {
+        if (isUnknown(from)) {
           unknown++;
           onPressure[from] = ground[(x + y) & 1];
-        } else {
-          const above = rest[from] === UNKNOWN_VALUE ? 0 : pressure[from] - rest[from];
-          onPressure[from] = pressureWord[above > floor ? Math.min(255, Math.round((255 * above) / scale)) : 0];
-        }
+        } else onPressure[from] = pressureWord[above(from) > floor ? Math.min(255, Math.round((255 * above(from)) / scale)) : 0];
         const moves = change ? Math.max(-127, Math.min(127, (127 * change[from]) / changes)) : 0;
         onChange[from] = changeWord[128 + Math.round(moves)];
       }
@@ -238,9 +234,8 @@ export class Maps {
     }
     this.info.unknown = unknown;
     const watched = this.taxel ? this.taxel[1] * columns + this.taxel[0] : -1;
-    const value = watched < 0 ? UNKNOWN_VALUE : pressure[watched];
-    this.info.value = value === UNKNOWN_VALUE ? null : value;
-    this.info.rest = watched < 0 || rest[watched] === UNKNOWN_VALUE ? null : rest[watched];
+    this.info.value = watched < 0 || isUnknown(watched) ? null : picture ? above(watched) + this.values.zero : pressure[watched];
+    this.info.rest = watched < 0 || picture || rest[watched] === UNKNOWN_VALUE ? null : rest[watched];
   }
 
   /** Writes the numbers beside the colours. */
@@ -252,7 +247,7 @@ export class Maps {
     write(part("change-least", HTMLElement), `−${rounded(Math.round(changes) * step)}`);
     write(part("change-top", HTMLElement), `+${rounded(Math.round(changes) * step)} ${unit}`);
     write(part("rest-from", HTMLElement), this.restWords());
-    write(part("pressure-above", HTMLElement), !frames || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
+    write(part("pressure-above", HTMLElement), this.picture ? this.picture.words : !frames || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
     const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
     write(part("unknown-count", HTMLElement), frames ? counted(unknown, "missing value") : counted(unknown, "taxel without events", "taxels without events"));

@@ -507,23 +507,39 @@ export interface DrawnRegion {
   taxels: [number, number][];
 }
 
-/** The regions of the file beside a recording, its name, and the unit of their curves. */
+/** The regions of the file beside a recording, its name, and the units of their curves by measure. */
 export interface Regions {
   type: "regions";
   source: string;
   file: string;
-  unit: string;
+  units: Record<"load" | "peak" | "mean" | "area", string>;
   regions: DrawnRegion[];
 }
 
-/** Least and greatest load of each region that was asked for in columns of time; null where there is no frame. A text says why a region has none. */
+/** Least and greatest of a measure of each region that was asked for in columns of time; null where there is no frame. A text says why a region has none. */
 export interface Loads {
   type: "loads";
   source: string;
+  measure: "load" | "peak" | "mean" | "area";
   first: number;
   count: number;
   column_us: number;
   curves: (([number, number] | null)[] | string)[];
+}
+
+/**
+ * Largest or mean values of a time above rest, row after row, in the unit of the frames; corners of isobars at 20, 40, 60 and 80 % of their largest;
+ * and the path of the centre of each sensor: time (us), x and y, null where nothing is loaded.
+ */
+export interface Picture {
+  type: "picture";
+  source: string;
+  kind: "maximum" | "mean";
+  start_us: number;
+  stop_us: number;
+  values: number[];
+  isobars: [number, number][][];
+  paths: ([number, number, number] | null)[][];
 }
 
 /** After the messages about everything that the request changed. */
@@ -716,9 +732,18 @@ export interface LoadsRequest {
   type: "loads";
   id?: number;
   regions: DrawnRegion[];
+  measure: "load" | "peak" | "mean" | "area";
   first: number;
   count: number;
   column_us: number;
+}
+
+export interface PictureRequest {
+  type: "picture";
+  id?: number;
+  kind: "maximum" | "mean";
+  start_us: number;
+  stop_us: number;
 }
 
 export interface WriteRegionsRequest {
@@ -815,6 +840,7 @@ export type Message =
   | Cut
   | Regions
   | Loads
+  | Picture
   | Done
   | Refused
   | Warning
@@ -851,6 +877,7 @@ export type Request =
   | CutRequest
   | RegionsRequest
   | LoadsRequest
+  | PictureRequest
   | WriteRegionsRequest
   | ChangeRequest
   | PortsRequest

@@ -8,13 +8,9 @@ import { seconds, short } from "./words.js";
 
 /** Transport's buttons and the requests behind them. One seek is under way at a time; of later ones the last counts. */
 export class Player {
-  /**
-   * @param {Server} server
-   * @param {(error: unknown) => void} failed
-   */
-  constructor(server, failed) {
+  /** @param {Server} server */
+  constructor(server) {
     this.server = server;
-    this.failed = failed;
     /** @type {Transport} */
     this.transport = { type: "transport", source: null, state: "paused", speed: 1, t_us: null };
     this.live = false;
@@ -71,27 +67,22 @@ export class Player {
     write(part("clock-more", HTMLElement), text);
   }
 
-  /** @param {import("./messages.js").Request} message */
-  ask(message) {
-    return this.server.request(message).catch(this.failed);
-  }
-
   toggle() {
     if (this.transport.state === "paused") this.play();
-    else this.ask({ type: "pause" });
+    else this.server.ask({ type: "pause" });
   }
 
   play() {
-    this.ask({ type: "play", speed: Number(this.speed.value) });
+    this.server.ask({ type: "play", speed: Number(this.speed.value) });
   }
 
   /** @param {number} frames */
   step(frames) {
-    this.ask({ type: "step", frames });
+    this.server.ask({ type: "step", frames });
   }
 
   follow() {
-    this.ask({ type: "live" });
+    this.server.ask({ type: "live" });
   }
 
   /** @param {number} by to the next (1) or the one before (-1) of the speeds */
@@ -119,7 +110,7 @@ export class Player {
     while (this.wanted !== null) {
       const t_us = this.wanted;
       this.wanted = null;
-      await this.ask({ type: "seek", t_us });
+      await this.server.ask({ type: "seek", t_us });
     }
     this.seeking = false;
   }

@@ -1,6 +1,6 @@
 // The values at the cursor: the server is asked for those of its time.
 
-import { failed } from "./notice.js";
+import { inTurn } from "./server.js";
 
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -11,26 +11,15 @@ export class Pointed {
    * @param {() => Timeline | null} timeline
    */
   constructor(server, timeline) {
-    this.server = server;
     this.timeline = timeline;
-    this.asking = false;
-    /** The time whose values were refused. @type {number | null} */
-    this.refused_us = null;
-  }
-
-  /** Asks for the values at the cursor, unless they are there. */
-  ask() {
-    const timeline = this.timeline();
-    const t_us = timeline?.cursor_us ?? null;
-    if (this.asking || t_us === null || timeline?.pointed?.t_us === t_us || this.refused_us === t_us) return;
-    this.asking = true;
-    this.server
-      .request({ type: "values", t_us })
-      .catch((error) => {
-        this.refused_us = t_us;
-        failed(error);
-      })
-      .finally(() => (this.asking = false));
+    /** The times whose values were asked for last, and refused last. */
+    let [asked_us, refused_us] = [NaN, NaN];
+    /** Asks for the values at the cursor, unless they are there. */
+    this.ask = inTurn(server, () => {
+      const { cursor_us = null, pointed = null } = timeline() ?? {};
+      if (cursor_us === null || cursor_us === refused_us || pointed?.t_us === cursor_us) return null;
+      return { type: "values", t_us: (asked_us = cursor_us) };
+    }, () => (refused_us = asked_us));
   }
 
   /** @param {import("./messages.js").Values} values */

@@ -1,6 +1,7 @@
 // Recording: name whose number moves on, length, label of the trial.
 
 import { make, part, write } from "./dom.js";
+import { failed } from "./notice.js";
 import { counted, size } from "./words.js";
 
 /** @typedef {import("./messages.js").Recorder} RecorderMessage */
@@ -14,12 +15,10 @@ const labelled = (labels) => (labels ? [counted(labels, "label")] : []);
 export class Recorder {
   /**
    * @param {Server} server
-   * @param {(error: unknown) => void} failed
    * @param {() => void} shown called to bring the tab to the front
    */
-  constructor(server, failed, shown) {
+  constructor(server, shown) {
     this.server = server;
-    this.failed = failed;
     this.shown = shown;
     this.able = false;
     /** @type {RecorderMessage | null} */
@@ -51,10 +50,7 @@ export class Recorder {
   /** Starts, or ends what runs. */
   toggle() {
     if (!this.able) return;
-    if (this.busy) {
-      this.server.request({ type: "stop" }).catch(this.failed);
-      return;
-    }
+    if (this.busy) return this.server.ask({ type: "stop" });
     part("record-reason", HTMLElement).hidden = true;
     const [name, label, length] = ["record-name", "record-label", "record-length"].map((id) => part(id, HTMLInputElement).value.trim());
     const length_s = length ? Number(length.replace(",", ".")) : null;

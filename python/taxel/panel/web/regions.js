@@ -1,14 +1,15 @@
 // Regions of a recording: drawn on the pressure map, named, moved and undone, and the curve of each in the lane of regions.
 
-import { make, part, withChildren, write } from "./dom.js";
+import { drawing, make, part, withChildren, write } from "./dom.js";
 import { failed, notify } from "./notice.js";
-import { RefusedError } from "./server.js";
+import { RefusedError, inTurn } from "./server.js";
 import { rounded } from "./words.js";
 
 /** @typedef {import("./geometry.js").Taxel} Taxel */
 /** @typedef {import("./geometry.js").Place} Corner */
 /** @typedef {import("./messages.js").DrawnRegion & { id: number }} Region never changed: what is moved is another one of the same number */
-/** @typedef {{ of: Region, first: number, end: number, column_us: number, columns: ([number, number] | null)[] }} Curve */
+/** @typedef {import("./messages.js").LoadsRequest["measure"]} Measure */
+/** @typedef {{ of: Region, measure: Measure, first: number, end: number, column_us: number, columns: ([number, number] | null)[] }} Curve */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
 /** Colours of regions, in turn, that differ for the colour-blind too (Tol's bright scheme, without its grey). */
@@ -22,13 +23,6 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 
 /** @param {number} k @returns {string} */
 export const regionColour = (k) => COLOURS[k % COLOURS.length];
-
-/** @template {keyof SVGElementTagNameMap} T @param {T} tag @param {Record<string, string | number>} attributes */
-function drawing(tag, attributes) {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  return element;
-}
 
 /** @param {Corner[]} corners @returns {boolean} whether they are those of a rectangle along the axes */
 const isRectangle = (corners) =>
@@ -60,10 +54,13 @@ export class Regions {
     this.chosen = null;
     /** @type {Map<number, Curve>} */
     this.curves = new Map();
-    /** The recording, the file of its regions, and the unit of their curves; "" while it has none. */
+    /** The recording and the file of its regions; "" while it has none. */
     this.source = "";
     this.file = "";
-    this.unit = "";
+    /** The units of each measure. @type {import("./messages.js").Regions["units"]} */
+    this.units = { load: "", peak: "", mean: "", area: "" };
+    this.chooses = part("region-measure", HTMLSelectElement);
+    this.chooses.onchange = () => this.show(true);
     /** What is drawn now. @type {"" | "rectangle" | "polygon" | "taxels"} */
     this.mode = "";
     /** Corners of the polygon or the rectangle that is being drawn. @type {Corner[]} */
@@ -71,9 +68,10 @@ export class Regions {
     /** What follows the pointer. @type {{ moves: (to: Corner) => void, ends: (to: Corner) => void } | null} */
     this.drags = null;
     this.next = 0;
-    this.asking = false;
     /** Those whose curves were asked for. @type {Region[]} */
     this.asked = [];
+    /** Asks for the curves of the window that are not known of a region as it is now. */
+    this.ask = inTurn(server, () => this.lacking());
     /** Numbers and names that were shown. */
     this.named = "";
     this.frame = part("pressure-frame", HTMLElement);
@@ -95,64 +93,61 @@ export class Regions {
 
   /** Another recording is shown, or the live source. @param {import("./messages.js").Opened | null} opened */
   choose(opened) {
-    const fits = opened?.frames != null && opened.frames.sources.length === 1;
     part("region-tools", HTMLElement).hidden = true;
     this.source = "";
     [this.all, this.before, this.chosen] = [[], [], null];
     this.draw("");
     this.show(true);
     for (const mode of ["rectangle", "polygon"]) part(`region-${mode}`, HTMLButtonElement).hidden = this.maps.geometry.kind === "channels";
-    if (fits) this.server.request({ type: "regions" }).catch(failed);
+    if (opened?.frames) this.server.ask({ type: "regions" });
   }
 
   /** @param {import("./messages.js").Regions} message */
-  take({ source, file, unit, regions }) {
-    [this.source, this.file, this.unit] = [source, file, unit];
+  take({ source, file, units, regions }) {
+    [this.source, this.file, this.units] = [source, file, units];
     this.all = regions.map((region) => ({ ...region, id: this.next++ }));
     part("region-tools", HTMLElement).hidden = false;
     this.show(true);
   }
 
   /** @param {import("./messages.js").Loads} message of the curves that were asked for */
-  takeLoads({ first, count, column_us, curves }) {
+  takeLoads({ measure, first, count, column_us, curves }) {
     this.asked.forEach((of, k) => {
       const curve = curves[k];
       if (typeof curve === "string") notify(curve, true);
-      this.curves.set(of.id, { of, first, end: first + count, column_us, columns: typeof curve === "string" ? [] : curve });
+      this.curves.set(of.id, { of, measure, first, end: first + count, column_us, columns: typeof curve === "string" ? [] : curve });
     });
     this.drawn();
   }
 
-  /** Asks for the curves of the window that are not known of a region as it is now; one request at a time. */
-  async ask() {
-    if (this.asking || !this.source) return;
-    this.asking = true;
-    for (;;) {
-      const timeline = this.timeline();
-      if (!timeline?.columns) break;
-      const [from, to] = timeline.columns;
-      const { column_us } = timeline;
-      const lacking = this.all.filter((region) => {
-        const curve = this.curves.get(region.id);
-        return !curve || curve.of !== region || curve.column_us !== column_us || curve.first > from - 1 || curve.end <= to;
-      });
-      if (!lacking.length) break;
-      this.asked = lacking;
-      const regions = lacking.map(({ name, corners, taxels }) => ({ name, corners, taxels }));
-      try {
-        await this.server.request({ type: "loads", regions, first: from - 1, count: to - from + 2, column_us });
-      } catch (error) {
-        failed(error);
-        break;
-      }
-    }
-    this.asking = false;
+  /** @returns {Measure} that of the curves */
+  get measure() {
+    return /** @type {Measure} */ (this.chooses.value);
+  }
+
+  /** @returns {string} what the curves are, in a word */
+  get quantity() {
+    return this.measure !== "load" ? this.chooses.selectedOptions[0].text : this.units.load === "N" ? "Force" : "Sum";
+  }
+
+  /** @returns {import("./messages.js").LoadsRequest | null} */
+  lacking() {
+    const { measure } = this;
+    const { columns = null, column_us = 0 } = this.timeline() ?? {};
+    if (!this.source || !columns) return null;
+    const [from, to] = columns;
+    this.asked = this.all.filter((region) => {
+      const curve = this.curves.get(region.id);
+      return curve?.of !== region || curve.measure !== measure || curve.column_us !== column_us || curve.first > from - 1 || curve.end <= to;
+    });
+    const regions = this.asked.map(({ name, corners, taxels }) => ({ name, corners, taxels }));
+    return regions.length ? { type: "loads", regions, measure, first: from - 1, count: to - from + 2, column_us } : null;
   }
 
   /** @param {Region} region @param {number} number of a column @param {number} column_us @returns {[number, number] | null} */
   at({ id }, number, column_us) {
     const curve = this.curves.get(id);
-    return curve?.column_us === column_us ? (curve.columns[number - curve.first] ?? null) : null;
+    return curve?.column_us === column_us && curve.measure === this.measure ? (curve.columns[number - curve.first] ?? null) : null;
   }
 
   // ---------------------------------------------------------------------------------------------- changes
@@ -363,7 +358,7 @@ export class Regions {
     write(part("region-file", HTMLElement), this.file && `Written as ${this.file}, beside the recording.`);
     if (!curves) return;
     const before = this.named;
-    this.named = JSON.stringify([this.unit, this.all.map(({ id, name }) => [id, name])]);
+    this.named = JSON.stringify([this.units, this.measure, this.all.map(({ id, name }) => [id, name])]);
     if (before !== this.named) this.renamed();
     this.ask();
   }
@@ -422,7 +417,7 @@ export class Regions {
   says(region) {
     const { cursor_us = null, t_us = null, column_us = 1 } = this.timeline() ?? {};
     const load = this.at(region, Math.floor((cursor_us ?? t_us ?? NaN) / column_us), column_us);
-    return load ? `${rounded(load[1])} ${this.unit}` : "";
+    return load ? `${rounded(load[1])} ${this.units[this.measure]}` : "";
   }
 
   /** @param {boolean} replace over a file that is there */

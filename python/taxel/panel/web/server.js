@@ -1,5 +1,6 @@
 // The connection to the server: requests with their answers, credits for frames, and reconnecting after a break.
 
+import { failed } from "./notice.js";
 import { VERSION } from "./protocol.js";
 
 /** @typedef {import("./messages.js").Message} Message */
@@ -16,6 +17,28 @@ export class RefusedError extends Error {
     super(message.reason);
     this.field = message.field;
   }
+}
+
+/**
+ * Asks for what is lacking, one request at a time.
+ * @param {Server} server
+ * @param {() => Request | null} lacking the next request
+ * @param {() => void} [refused] called where one is refused, which ends this turn
+ * @returns {() => Promise<void>}
+ */
+export function inTurn(server, lacking, refused) {
+  let asking = false;
+  return async () => {
+    if (asking) return;
+    asking = true;
+    try {
+      for (let request = lacking(); request; request = lacking()) await server.request(request);
+    } catch (error) {
+      refused?.();
+      failed(error);
+    }
+    asking = false;
+  };
 }
 
 /** One WebSocket, opened again after it has closed. */
@@ -81,6 +104,11 @@ export class Server {
    */
   send(message) {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  /** Makes a request; the user sees why it was refused. @param {Request} message */
+  ask(message) {
+    return this.request(message).catch(failed);
   }
 
   /**

@@ -2,7 +2,7 @@
 
 import { part } from "./dom.js";
 
-const TABS = /** @type {const} */ (["board", "record", "labels", "train", "view"]);
+export const TABS = /** @type {const} */ (["board", "record", "labels", "train", "view"]);
 /** @typedef {(typeof TABS)[number]} Tab */
 
 /** @param {Tab} chosen @param {boolean} [focus] */

@@ -1,6 +1,7 @@
 // The tab of the view: the colour scale, the health of taxels, and cuts.
 
 import { make, part, write } from "./dom.js";
+import { failed } from "./notice.js";
 import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./messages.js").Health} Health */
@@ -12,12 +13,10 @@ export class View {
   /**
    * @param {Server} server
    * @param {Settings} settings
-   * @param {(error: unknown) => void} failed
    * @param {(taxel: [number, number]) => void} pointed called for a taxel of the list
    */
-  constructor(server, settings, failed, pointed) {
+  constructor(server, settings, pointed) {
     this.server = server;
-    this.failed = failed;
     this.pointed = pointed;
     /** @type {[number | null, number | null]} */
     this.cut = [null, null];
@@ -45,7 +44,7 @@ export class View {
     write(part("health-info", HTMLElement), "checking …");
     return this.server.request({ type: "health" }).catch((error) => {
       write(part("health-info", HTMLElement), "");
-      this.failed(error);
+      failed(error);
     });
   }
 
@@ -96,6 +95,6 @@ export class View {
   write() {
     const [start_us, stop_us] = this.cut;
     if (start_us === null || stop_us === null) return;
-    this.server.request({ type: "cut", start_us, stop_us, name: part("cut-name", HTMLInputElement).value.trim() }).catch(this.failed);
+    this.server.ask({ type: "cut", start_us, stop_us, name: part("cut-name", HTMLInputElement).value.trim() });
   }
 }

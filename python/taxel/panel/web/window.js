@@ -1,7 +1,7 @@
 // The window of time that the lanes show: it zooms and scrolls as a time axis, and the server sends the columns that it lacks.
 
 import { make, part, withChildren, write } from "./dom.js";
-import { failed } from "./notice.js";
+import { inTurn } from "./server.js";
 import { SPAN } from "./timeline.js";
 import { short } from "./words.js";
 
@@ -30,14 +30,14 @@ export class TimeWindow {
    * @param {() => void} moved called when the window has changed
    */
   constructor(server, player, timeline, limits, moved) {
-    this.server = server;
     this.player = player;
     this.timeline = timeline;
     this.limits = limits;
     this.moved = moved;
     /** The columns that were asked for: their width, and where they end. @type {{ column_us: number, end_us: number | null } | null} */
     this.asked = null;
-    this.asking = false;
+    /** Asks for the columns of the window, unless the server has been asked for them. */
+    this.ask = inTurn(server, () => this.lacking(), () => this.forget());
     /** The time shown when the window last moved to it. @type {number | null} */
     this.t_us = null;
     this.axis = part("axis", HTMLElement);
@@ -57,17 +57,7 @@ export class TimeWindow {
     return column_us;
   }
 
-  /** Shows half the stretch of time, around the cursor, or around the time shown. */
-  halve() {
-    this.scale(0.5);
-  }
-
-  /** Shows twice the stretch of time. */
-  double() {
-    this.scale(2);
-  }
-
-  /** @param {number} times as long a stretch of time as now, around the cursor */
+  /** @param {number} times as long a stretch of time as now, around the cursor, or around the time shown */
   scale(times) {
     const timeline = this.timeline();
     if (!timeline?.window) return;
@@ -138,35 +128,23 @@ export class TimeWindow {
     else this.set(t_us - (t_us > from ? AHEAD : 1 - AHEAD) * timeline.span_us, t_us + (t_us > from ? 1 - AHEAD : AHEAD) * timeline.span_us);
   }
 
-  /** Asks for the columns of the window, unless the server has been asked for them. */
-  async ask() {
-    if (this.asking) return;
-    this.asking = true;
-    for (;;) {
-      const timeline = this.timeline();
-      if (!timeline?.window) break;
-      const column_us = this.columnFor(timeline);
-      const [from, to] = timeline.window;
-      let end_us = null;
-      if (!timeline.following) {
-        const { reach } = this.player;
-        const [first, last] = reach ?? [from, to];
-        const { asked } = this;
-        const begins = asked?.end_us != null ? asked.end_us - (SPAN - 1) * column_us : Infinity;
-        if (asked?.column_us === column_us && asked.end_us !== null && asked.end_us >= Math.min(to, last) && begins <= Math.max(from, first)) break;
-        // As much beyond the window on either side, so that it can be moved.
-        end_us = Math.round(to + ((SPAN - 1) * column_us - timeline.span_us) / 2);
-      } else if (this.asked?.column_us === column_us && this.asked.end_us === null) break;
-      this.asked = { column_us, end_us };
-      try {
-        await this.server.request({ type: "zoom", column_us, end_us });
-      } catch (error) {
-        failed(error);
-        this.asked = null;
-        break;
-      }
-    }
-    this.asking = false;
+  /** @returns {import("./messages.js").ZoomRequest | null} */
+  lacking() {
+    const timeline = this.timeline();
+    if (!timeline?.window) return null;
+    const column_us = this.columnFor(timeline);
+    const [from, to] = timeline.window;
+    const { asked } = this;
+    let end_us = null;
+    if (!timeline.following) {
+      const [first, last] = this.player.reach ?? [from, to];
+      const begins = asked?.end_us != null ? asked.end_us - (SPAN - 1) * column_us : Infinity;
+      if (asked?.column_us === column_us && asked.end_us !== null && asked.end_us >= Math.min(to, last) && begins <= Math.max(from, first)) return null;
+      // As much beyond the window on either side, so that it can be moved.
+      end_us = Math.round(to + ((SPAN - 1) * column_us - timeline.span_us) / 2);
+    } else if (asked?.column_us === column_us && asked.end_us === null) return null;
+    this.asked = { column_us, end_us };
+    return { type: "zoom", ...this.asked };
   }
 
   /** Writes the axis. @param {import("./timeline.js").Tick[]} ticks */
