@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -151,15 +149,6 @@ def test_goals_that_are_not_reached_or_not_measured_end_with_1(
     assert call(capsys, "bench", "fast", "--goals", "--results", folder / "results")[0] == code
 
 
-def test_benchmarks_are_listed_with_what_they_took(folder: Path, capsys) -> None:
-    (folder / "results" / "fast.json").write_text(json.dumps({"took_s": 12.4}))
-    code, out, _ = call(capsys, "bench", "--results", folder / "results")
-    assert (code, out.splitlines()) == (
-        0,
-        [f"fast{'12 s':>33}  How fast is it?", f"other{'no result':>32}  How fast is it?"],
-    )
-
-
 @pytest.mark.parametrize("saved", [{}, {"left out": {}}, {"left out": {"peer": "not installed"}}, None])
 def test_a_result_with_peers_is_not_replaced_by_one_without(
     folder: Path, capsys, monkeypatch: pytest.MonkeyPatch, saved: dict | None
@@ -188,41 +177,3 @@ def test_each_benchmark_states_goals_and_judges_its_saved_result(name: str) -> N
     goals = BENCHMARKS[name].goals(result)
     assert goals
     assert [goal.what for goal in goals if goal.figure is None] == [], f"run taxel bench {name}"
-
-
-def test_a_benchmark_runs_in_a_process_of_its_own_on_no_other_calls(folder: Path) -> None:
-    """A peer that looks through the stack does not pay for the command line."""
-    for shared in PACKAGE.glob("_*.py"):
-        shutil.copy(shared, folder)
-
-    def bench() -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "taxel", "bench", "fast", "--quick"],
-            env=os.environ | {"PYTHONPATH": str(folder.parent)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-    text = (folder / "fast.py").read_text()
-    calls = 'return {"ratios": {"calls": len(inspect.stack())}, "machine": {"cores": 2}}'
-    (folder / "fast.py").write_text("import inspect\n" + text.replace("return often(victor_purpura)", calls))
-    done = bench()
-    # Those that start a child process are few beside the command line's.
-    found = re.search(r" (\d+) +calls\n", done.stdout)
-    assert found, done.stderr
-    assert int(found[1]) < 10
-    (folder / "fast.py").write_text(text.replace("return often(victor_purpura)", 'raise SystemExit("broken")'))
-    assert "fast: ended with status 1" in bench().stderr
-
-
-def test_a_peer_that_is_left_out_is_named_with_how_to_install_it(folder: Path, capsys, monkeypatch) -> None:
-    absent = _rounds.missing({"here": "json", "of scikit-learn": "sklearn absent_one"})
-    assert absent.keys() == {"of scikit-learn"}
-    monkeypatch.setattr(_rounds, "find_spec", lambda name: None)
-    absent = _rounds.missing({"of scikit-learn": "sklearn other"})
-    assert absent["of scikit-learn"].endswith(": pip install scikit-learn other")
-    result = {"ratios": {"a": 3.5}, "machine": {"cores": 2}, "left out": absent}
-    monkeypatch.setattr(_rounds, "alone", lambda name, quick: result)
-    out = call(capsys, "bench", "fast", "--quick", "--results", folder / "results")[1]
-    assert "  left out: of scikit-learn: sklearn and other not installed: pip install scikit-learn other\n" in out

@@ -85,12 +85,3 @@ def test_a_pair_with_a_peer_that_is_left_out_is_not_compared(clock: Clock) -> No
     assert found["ratios"] == {"there": 2.0}
     assert found["spread"] == {"there": [2.0, 2.0]}
     assert found["stable"]
-
-
-def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -> None:
-    rounds = [{"found": n, "lost": {"queue": 1}, "late": {"p50": p}} for n, p in ((3, 1.0), (4, 9.0), (5, 2.0))]
-    assert _rounds.together(rounds) == {
-        "found": 12,
-        "lost": {"queue": 3},
-        "late": {"p50": 2.0, "p50 quartiles": [1.5, 5.5]},
-    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from taxel_studies import fig6_10, load, waves
+from taxel_studies import fig6_10, waves
 from taxel_studies.study import Judgement
 
 
@@ -19,12 +19,6 @@ def test_the_verdict_is_of_the_levels_asked_about_and_turns_with_the_curves(spar
     assert "do not cross" in summary.ours
     other = fig6_10._compared(83, curve, "ms", False, (0.5, 2.0))
     assert other.holds is (sparse_gains < 0)
-
-
-def test_every_ratio_of_norms_is_run_in_both_trainings() -> None:
-    p = load("fig6.10").set("toy")
-    ratios = {tuple(t.params["lambdas"][:2]) for t in fig6_10.tasks(p) if "lambdas" in t.params}
-    assert not ratios or ratios == {tuple(map(float, ratio)) for ratio in p["ratios"]}
 
 
 def test_a_claim_holds_in_a_reading_of_b_if_it_does_at_every_delta_t() -> None:

@@ -6,9 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from taxel_studies import load
-from taxel_studies.study import CPU_SECONDS
-
 _spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
 assert _spec is not None
 assert _spec.loader is not None
@@ -50,19 +47,3 @@ def test_a_report_of_another_commit_or_beside_local_changes_is_not_kept(
 def test_claims_are_judged_from_the_numbers_that_stand_beside_them(file: Path) -> None:
     section = json.loads(file.read_text())
     assert section["judgements"] == figures.judged(section), "run docs/figures.py"
-
-
-def test_a_run_says_first_how_long_it_takes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(CPU_SECONDS, "fig6.1", ("full", 600))
-    begun: list[str] = []
-
-    def stop(*_: object, **__: object) -> None:
-        begun.append(capsys.readouterr().err)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("taxel_studies.study.run", stop)
-    with pytest.raises(KeyboardInterrupt):
-        load("fig6.1").run(tmp_path)
-    assert begun[0].startswith("fig6.1: about 10 min with 1 of --jobs: the kept runs took 600 s of CPU, and 100 %")
