@@ -165,7 +165,8 @@ def _about(
     kept = [foot["kept"] for by_side in feet.values() for foot in by_side.values() if foot["kept"]]
     above = "1 % of the print's largest value" if options.above is None else f"{options.above:g}"
     whose = "each print's own" if options.own_mask else "one for each person's foot, found on its mean footprint"
-    reasons = {} if options.saturation is not None else {"saturated_cells": "say --saturation VALUE"}
+    known = any("saturated_cells" in row for row in rows)
+    reasons = {} if known else {"saturated_cells": "the end of a taxel's range is not known: say --saturation VALUE"}
     if options.mask != "footscan":
         reasons["balance_foot_pct, balance_forefoot_pct"] = "of footscan's regions: say --mask footscan"
     of_prints = [
