@@ -15,7 +15,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from taxel import FormatError, ProblemError
-from taxel.recording.kinds import is_folder, natural_order, recordings_in
+from taxel.recording.kinds import FOREIGN, is_folder, kind_of, natural_order, recordings_in
 
 __all__ = ["PEOPLE", "RECORDINGS", "Cohort", "Entry"]
 
@@ -110,6 +110,10 @@ def _of_folder(folder: Path, layout: Path | None) -> Cohort:
         walks: dict[str, list[Entry]] = {}
         for row in listed:
             files_of = _named(row["recording"], names)
+            # A table of another program, which counts in a folder of tables alone.
+            if not files_of and (other := folder / row["recording"]).is_file():
+                files_of = [_name(folder, other)]
+                names |= {files_of[0]: other}
             if people and row["person"] not in weights:
                 raise FormatError(f"{folder / RECORDINGS}: {row['person']} is not a person of {PEOPLE}")
             if not files_of:
@@ -147,8 +151,19 @@ def _walk(table: Path, name: str, rows: Sequence[Entry]) -> Entry:
 def _files(folder: Path, layout: Path | None) -> list[Path]:
     """Return the recordings in a folder, and in its folders."""
     deeper = [one for one in sorted(folder.iterdir(), key=natural_order) if is_folder(one)]
-    found = [file for place in (folder, *deeper) for file in recordings_in(place, layout)]
+    found = list[Path]()
+    for place in (folder, *deeper):
+        own = recordings_in(place, layout)
+        # Beside taxel's own files those of makers are recordings too.
+        found += own + [
+            file for file in sorted(place.iterdir(), key=natural_order) if file not in own and _is_maker(file)
+        ]
     return [file for file in found if file.name not in (PEOPLE, RECORDINGS) and not _is_result(file)]
+
+
+def _is_maker(file: Path) -> bool:
+    """Return whether a file is one of a maker, or of a published data set."""
+    return file.is_file() and kind_of(file) not in (None, "ros", *FOREIGN)
 
 
 def _is_result(file: Path) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,7 +19,18 @@ from taxel_gait import kept, running
 from taxel_gait.cohort import Cohort, Entry
 from taxel_gait.measures import CENTRE
 from taxel_gait.measuring import Measured, StepOptions, measure
-from taxel_gait.tables import SUMMED, SYMMETRIES, Summary, Table, columns_of, curves, figure, summary, symmetry
+from taxel_gait.tables import (
+    SUMMED,
+    SYMMETRIES,
+    Summary,
+    Table,
+    columns_of,
+    curves,
+    figure,
+    load_name,
+    summary,
+    symmetry,
+)
 
 app = App(name="steps")
 
@@ -27,6 +38,8 @@ app = App(name="steps")
 FOLDER = Path("taxel-steps")
 _TABLES = ("steps.csv", "summary.csv", "symmetry.csv", "curves.csv")
 _PAGE = "report.html"
+#: How many recordings a line names.
+_NAMED = 3
 #: What the columns are, in words from which they can be computed anew.
 _RULE = (
     "a stance: from where the load rises to 30 % of its range (10th, of a single sensor 15th, to 95th percentile of 20 "
@@ -119,7 +132,7 @@ def steps(
             say(f"taxel: {cohort.place}: no step was found, so no table is written", err=True)
         return WRONG_INPUT
     definitions = list(dict.fromkeys(words for one in measured.values() for words in one.definitions))
-    about = _about(list(measured.values()), definitions, rows, left_out, options)
+    about = _about(measured, definitions, rows, left_out, options)
     over_stance = [curve for one in measured.values() for curve in one.curves]
     written = _write(folder, about, rows, over_stance, decimal_comma=decimal_comma, overwrite=output.overwrite)
     write_report(folder / _PAGE, about, definitions, rows, over_stance, overwrite=output.overwrite)
@@ -159,7 +172,7 @@ def _measure(tables: dict[Entry, list[Path]], options: StepOptions, reading: Rea
 
 
 def _about(
-    measured: Sequence[Measured],
+    measured: Mapping[Entry, Measured],
     definitions: Sequence[str],
     rows: Sequence[dict[str, Any]],
     left_out: dict[str, str],
@@ -167,7 +180,10 @@ def _about(
 ) -> list[str]:
     """Return what stands above the names of each table."""
     used = Counter(row["used"] for row in rows)
-    reasons = {name: why for one in measured for name, why in one.reasons.items()}
+    reasons: dict[str, list[str]] = {}
+    for entry, one in measured.items():
+        for name, why in one.reasons.items():
+            reasons.setdefault(f"{name}: {why}", []).append(entry.name)
     return [
         f"taxel {taxel.__version__}, taxel steps",
         *definitions,
@@ -175,9 +191,15 @@ def _about(
         *_WORDS,
         f"means are of {used['yes']} steps that are used; left out: "
         + (", ".join(f"{count} {name}" for name, count in used.items() if name != "yes") or "none"),
-        *(f"empty: {name}: {why}" for name, why in reasons.items()),
+        *(f"empty: {why}{_of(names, len(measured))}" for why, names in reasons.items()),
         *(f"not measured: {name}: {why}" for name, why in left_out.items()),
     ]
+
+
+def _of(names: Sequence[str], count: int) -> str:
+    """Return of which recordings something is said, of so many; "" of all."""
+    more = f" and {len(names) - _NAMED} more" * (len(names) > _NAMED)
+    return "" if len(names) == count else f", of {', '.join(names[:_NAMED])}{more}"
 
 
 def _write(
@@ -191,17 +213,18 @@ def _write(
 ) -> list[Path]:
     """Write the tables; return their paths."""
     summed, group = summary(rows), ["person", "condition"]
+    loads = {tuple(row[name] for name in (*group, "foot")): load for row in rows if (load := load_name(row))}
     of_curves = [
-        {"person": person, "condition": condition, "foot": foot, "stance_pct": pct, "n": n, "mean": m, "sd": s}
-        for (person, condition, foot), (n, mean, sd) in curves(rows, over_stance).items()
+        dict(zip((*group, "foot"), key, strict=True))
+        | {"load": loads[key], "stance_pct": pct, "n": n, "mean": m, "sd": s}
+        for key, (n, mean, sd) in curves(rows, over_stance).items()
         for pct, (m, s) in enumerate(zip(mean.tolist(), sd.tolist(), strict=True))
     ]
-    load = next((name for row in rows for name in row if name.startswith("mean_")), "mean").removeprefix("mean_")
     tables = [
         Table(about, columns_of(rows, _EMPTY), rows),
         Table(about, [*group, "foot", *SUMMED], [one.row() for one in summed]),
         Table(about, [*group, "measure", "left", "right", *SYMMETRIES], symmetry(summed)),
-        Table([*about, f"the load over stance: {load}"], [*group, "foot", "stance_pct", "n", "mean", "sd"], of_curves),
+        Table(about, [*group, "foot", "load", "stance_pct", "n", "mean", "sd"], of_curves),
     ]
     paths = [folder / name for name in _TABLES]
     for path, table in zip(paths, tables, strict=True):

@@ -36,6 +36,8 @@ class Foot:
         The load of the whole foot, in `unit`.
     unit : str
         "N", or the unit of the values, of which it is then the sum.
+    range_end : float, in the unit of the values, optional
+        Where the range of a taxel ends, if the file states it.
     """
 
     side: str
@@ -44,6 +46,7 @@ class Foot:
     t: NDArray[np.float64]
     force: NDArray[np.float64]
     unit: str
+    range_end: float | None = None
 
     @classmethod
     def of(cls, recording: Recording, side: str = "") -> Foot:
@@ -60,7 +63,9 @@ class Foot:
             whole = ~np.isnan(frames.values).any(axis=(1, 2))
             frames = Frames(frames.values[whole], frames.t[whole], unit=frames.unit, array=frames.array)
         force, unit = load_of(frames)
-        return cls(side or recording.side, recording.label, frames, frames.t / 1e6, force, unit)
+        # A calibration's unit is another.
+        end = recording.range_end if recording.calibration is None else None
+        return cls(side or recording.side, recording.label, frames, frames.t / 1e6, force, unit, end)
 
     @property
     def is_channel(self) -> bool:

@@ -19,7 +19,7 @@ from taxel.tasks import Workers
 from taxel_gait import running
 from taxel_gait.cohort import Cohort
 from taxel_gait.footprints import FootprintOptions, Footprints, Person, mask_file, measure_person, people_of
-from taxel_gait.tables import SUMMED, SYMMETRIES, Table, columns_of, summary, symmetry
+from taxel_gait.tables import SUMMED, SYMMETRIES, Curves, Table, columns_of, load_name, summary, symmetry
 
 app = App(name="footprint")
 
@@ -101,7 +101,6 @@ def footprint(
             taxel.write_regions(file, own, overwrite=True)
     about = _about(rows, feet, options, left_out)
     about += dict.fromkeys(line for one in measured for line in one.about)
-    load = next(name.removeprefix("mean_") for name in rows[0] if name.startswith("mean_"))
     summed = [*summary(rows), *summary(regions)]
     means = _means(rows, [one for each in measured for one in each.curves])
     group = ["person", "condition"]
@@ -111,11 +110,12 @@ def footprint(
         "summary.csv": Table(about, [*group, "foot", "region", *SUMMED], [one.row() for one in summed]),
         "symmetry.csv": Table(about, [*group, "region", "measure", "left", "right", *SYMMETRIES], symmetry(summed)),
         "curves.csv": Table(
-            [*about, f"the load over stance: {load}"],
-            ["person", "foot", "region", "stance_pct", "mean", "sd"],
+            about,
+            [*group, "foot", "load", "region", "stance_pct", "mean", "sd"],
             [
-                {"person": person, "foot": foot, "region": name, "stance_pct": pct, "mean": m, "sd": s}
-                for (person, foot), own in means.items()
+                dict(zip((*group, "foot", "load"), key, strict=True))
+                | {"region": name, "stance_pct": pct, "mean": m, "sd": s}
+                for key, own in means.items()
                 for name, (mean, sd) in own.items()
                 for pct, (m, s) in enumerate(zip(mean.tolist(), sd.tolist(), strict=True))
             ],
@@ -123,9 +123,7 @@ def footprint(
     }
     for name, table in written.items():
         table.write(folder / name, decimal_comma=decimal_comma, overwrite=output.overwrite)
-    by_person = {name: [one for one in summed if one.person == name] for name in feet}
-    name, _, unit = load.partition("_")
-    write_report(folder / _PAGE, about, feet, means, by_person, f"{name} ({unit})", overwrite=output.overwrite)
+    write_report(folder / _PAGE, about, feet, means, summed, overwrite=output.overwrite)
     if options.boxes:
         text = "\n".join(["recording,label,t_us", *(line for one in measured for line in one.labels), ""])
         (folder / "boxes" / "labels.csv").write_text(text, "utf-8")
@@ -165,7 +163,8 @@ def _about(
     kept = [foot["kept"] for by_side in feet.values() for foot in by_side.values() if foot["kept"]]
     above = "1 % of the print's largest value" if options.above is None else f"{options.above:g}"
     whose = "each print's own" if options.own_mask else "one for each person's foot, found on its mean footprint"
-    reasons = {} if options.saturation is not None else {"saturated_cells": "say --saturation VALUE"}
+    known = any("saturated_cells" in row for row in rows)
+    reasons = {} if known else {"saturated_cells": "the end of a taxel's range is not known: say --saturation VALUE"}
     if options.mask != "footscan":
         reasons["balance_foot_pct, balance_forefoot_pct"] = "of footscan's regions: say --mask footscan"
     of_prints = [
@@ -196,15 +195,14 @@ def _about(
     ]
 
 
-def _means(
-    rows: Sequence[dict[str, Any]], curves: Sequence[dict[str, list[float]]]
-) -> dict[tuple[str, str], dict[str, tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]]]:
-    """Return mean and SD of the curves of the prints that are used, by person and foot, and region."""
-    by_foot: dict[tuple[str, str], dict[str, list[list[float]]]] = {}
+def _means(rows: Sequence[dict[str, Any]], curves: Sequence[dict[str, list[float]]]) -> Curves:
+    """Return mean and SD of the curves of the prints that are used."""
+    by_foot: dict[tuple[str, str, str, str], dict[str, list[list[float]]]] = {}
     for row, own in zip(rows, curves, strict=True):
         if row["used"] == "yes":
+            key = (row["person"], row["condition"], row["foot"], load_name(row))
             for name, curve in own.items():
-                by_foot.setdefault((row["person"], row["foot"]), {}).setdefault(name, []).append(curve)
+                by_foot.setdefault(key, {}).setdefault(name, []).append(curve)
     return {
         key: {
             name: (np.mean(some, axis=0), np.std(some, axis=0, ddof=1) if len(some) > 1 else np.full(101, np.nan))

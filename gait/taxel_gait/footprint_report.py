@@ -14,7 +14,7 @@ from taxel.report import write_whole
 from taxel.report.page import render
 from taxel_gait.drawing import Axes, spanned
 from taxel_gait.masks import CELL_MM
-from taxel_gait.tables import Summary, figure
+from taxel_gait.tables import Curves, Summary, figure
 
 __all__ = ["write_report"]
 
@@ -42,9 +42,8 @@ def write_report(
     path: Path,
     about: Sequence[str],
     feet: Mapping[str, Mapping[str, Any]],
-    curves: Mapping[tuple[str, str], Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]],
-    summed: Mapping[str, Sequence[Summary]],
-    load: str,
+    curves: Curves,
+    summed: Sequence[Summary],
     *,
     overwrite: bool,
 ) -> None:
@@ -57,33 +56,35 @@ def write_report(
         What the tables have above their names.
     feet : mapping from person to mapping from side to mapping
         As of `Footprints.feet`.
-    curves : mapping from (person, side) to mapping from region to (mean, SD)
-    summed : mapping from person to sequence of Summary
+    curves : Curves
+    summed : sequence of Summary
         Means of whole prints (region "") and of regions.
-    load : str
-        The name and the unit of the load.
     overwrite : bool
     """
     sheets = []
-    for person, by_side in feet.items():
+    # A person without a print in means has a sheet that says so.
+    groups = dict.fromkeys([(person, condition) for person, condition, *_ in curves])
+    groups |= dict.fromkeys((person, "") for person in feet if person not in {whose for whose, _ in groups})
+    for person, condition in groups:
+        own_rows = [one for one in summed if (one.person, one.condition) == (person, condition)]
+        own_curves = {key[2:]: own for key, own in curves.items() if key[:2] == (person, condition)}
         sheets.append(
             {
-                "title": person or "footprints",
+                "title": " ".join(filter(None, (person, condition))) or "footprints",
                 "feet": [
                     {
                         "side": side or "side not known",
                         "pictures": [
-                            draw(foot, side) for foot in [by_side.get(side)] if foot for draw in (_map, _picture)
+                            draw(foot, side) for foot in [feet[person].get(side)] if foot for draw in (_map, _picture)
                         ],
                         "whole": _curves(own, ["whole"], load),
                         "regions": _curves(own, [name for name in own if name != "whole"], load),
                     }
-                    for (whose, side), own in sorted(curves.items())
-                    if whose == person
+                    for (side, load), own in sorted(own_curves.items())
                 ],
-                "key": _key(next((own for (whose, _), own in curves.items() if whose == person), {})),
-                "prints": {one.foot or "side not known": one.means.n for one in summed[person] if not one.region},
-                **_table(summed[person]),
+                "key": _key(next(iter(own_curves.values()), {})),
+                "prints": {one.foot or "side not known": one.means.n for one in own_rows if not one.region},
+                **_table(own_rows),
             }
         )
     text = render("footprints.html.j2", package="taxel_gait", about=about, sheets=sheets)
@@ -195,7 +196,9 @@ def _curves(
     there = [name for name in names if name in own]
     tops = [float(np.max(own[name][0] + np.nan_to_num(own[name][1]))) for name in there]
     title = "whole foot, mean and SD" if names == ["whole"] else "regions, means"
-    axes = Axes((0.0, 100.0), spanned(tops, zero=True), "stance (%)", load, title, width=330, height=170)
+    name, _, unit = load.partition("_")
+    words = f"{name} ({unit})"
+    axes = Axes((0.0, 100.0), spanned(tops, zero=True), "stance (%)", words, title, width=330, height=170)
     pct = np.linspace(0, 100, 101)
     for name in there:
         mean, sd = own[name]

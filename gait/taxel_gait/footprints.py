@@ -61,7 +61,7 @@ class FootprintOptions:
     above
         A cell with a greater value is loaded, in the recording's unit. Default: 1 % of the print's largest value.
     saturation
-        The value at which the range of a cell ends, in the recording's unit.
+        The value at which the range of a cell ends, in the recording's unit. Default: that which the file states.
 
     Raises
     ------
@@ -158,6 +158,7 @@ class _Footfall(NamedTuple):
     placed: Placed | None
     used: str
     weight_kg: float | None
+    saturation: float | None
     regions: tuple[Region, ...] = ()
 
 
@@ -212,7 +213,8 @@ def _footfalls(entry: Entry, options: FootprintOptions, reading: Reading, about:
                     placed = place(one, side or sensor.side)
                     doubts = "; ".join(placed.doubts)
                     foot = {"step": number, "foot": placed.side}
-                    yield _Footfall(keys | foot, one, placed, doubts or used, entry.weight_kg)
+                    end = sensor.range_end if sensor.calibration is None else None
+                    yield _Footfall(keys | foot, one, placed, doubts or used, entry.weight_kg, end)
 
 
 def _of_insoles(trial: Recording, side: str, options: FootprintOptions, about: list[str]) -> Iterator[_Footfall]:
@@ -240,7 +242,8 @@ def _of_insoles(trial: Recording, side: str, options: FootprintOptions, about: l
         foot = feet[step.foot]
         if step.used != "cut":
             one = Print(foot.frames[step.first : step.end], options.above or 0.0)
-            yield _Footfall({"step": step.number, "foot": foot.side}, one, None, step.used, None, regions)
+            keys = {"step": step.number, "foot": foot.side}
+            yield _Footfall(keys, one, None, step.used, None, foot.range_end, regions)
 
 
 def _prints(recording: Recording, options: FootprintOptions) -> Iterator[tuple[int, str, Print]]:
@@ -291,12 +294,13 @@ def _over_stance(one: Print, placed: Placed) -> np.ndarray[Any, np.dtype[np.floa
 
 def _measure(found: Footprints, footfall: _Footfall, options: FootprintOptions) -> None:
     """Add what is measured of a footfall; one that is doubtful has no regions."""
-    keys, one, placed, used, weight_kg, _ = footfall
+    keys, one, placed, used, weight_kg, stated, _ = footfall
+    saturation = stated if options.saturation is None else options.saturation
     keys = keys | {"used": used, "contact_s": float(one.frames.t[0]) / 1e6}
     regions = _regions(found, footfall, options)
     loads = loads_of(one, regions)
     toes = [region for region in regions if region.name.startswith(_TOES)]
-    cells = of_print(one, placed, loads, toes, options.saturation, weight_kg)
+    cells = of_print(one, placed, loads, toes, saturation, weight_kg)
     if options.mask == "footscan" and regions:
         cells |= balances(loads, one.t)
     found.rows.append(keys | _plain(cells))
@@ -304,7 +308,7 @@ def _measure(found: Footprints, footfall: _Footfall, options: FootprintOptions) 
     total = sum(float(np.trapezoid(own.force, one.t)) for name, own in loads.items() if name != "whole")
     for region in regions:
         own = loads.get(region.name)
-        measured = {} if own is None else of_region(one, own, total, options.saturation)
+        measured = {} if own is None else of_region(one, own, total, saturation)
         found.regions.append(keys | {"region": region.name} | _plain(measured))
 
 

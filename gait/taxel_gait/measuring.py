@@ -51,7 +51,7 @@ class StepOptions:
     above
         A taxel with a greater value is loaded, in the recording's unit.
     saturation
-        The value at which the range of a taxel ends, in the recording's unit.
+        The value at which the range of a taxel ends, in the recording's unit. Default: that which the file states.
 
     Raises
     ------
@@ -239,7 +239,8 @@ def _row(
     values = {"contact_s": step.contact_s, "lift_s": step.lift_s, **step.times}
     curve = None
     if not np.isnan(step.lift_s - step.contact_s):
-        above, saturation = options.above, options.saturation
+        above = options.above
+        saturation = foot.range_end if options.saturation is None else options.saturation
         values |= measures_of(foot, step, above=above, saturation=saturation, weight_kg=weight_kg)
         curve = [round(float(point), 3) for point in curve_of(foot, step)]
     return cells | {name: None if np.isnan(value) else float(value) for name, value in values.items()}, curve
@@ -255,7 +256,7 @@ def _reasons(feet: Sequence[Foot], options: StepOptions) -> dict[str, str]:
             reasons["contact_area_cm2"] = "the area of a taxel is not known"
         if foot.frames.array.centre_unit is None:
             reasons["cop_length, cop_speed"] = "the places of the taxels are not known"
-    if options.saturation is None:
+    if options.saturation is None and any(foot.range_end is None for foot in feet):
         reasons["saturated_cells"] = "the end of a taxel's range is not known: say --saturation VALUE"
     return reasons
 

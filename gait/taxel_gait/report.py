@@ -13,7 +13,7 @@ from markupsafe import Markup
 from taxel.report import write_whole
 from taxel.report.page import render
 from taxel_gait.drawing import COLOURS, LEFT_OUT, Axes, spanned
-from taxel_gait.tables import SYMMETRIES, curves, figure, summary, symmetry
+from taxel_gait.tables import SYMMETRIES, curves, figure, load_name, summary, symmetry
 
 __all__ = ["write_report"]
 
@@ -98,9 +98,8 @@ def _sheet(
 
 def _unit(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the name of the load, and its unit."""
-    name = next((name for row in rows for name in row if name.startswith("mean_")), "mean_load")
-    _, load, *unit = name.split("_")
-    return f"{load} ({'_'.join(unit)})" if unit else load
+    load, _, unit = next(filter(None, map(load_name, rows)), "load").partition("_")
+    return f"{load} ({unit})" if unit else load
 
 
 def _strips(rows: Sequence[Mapping[str, Any]], over_stance: Sequence[Sequence[float] | None]) -> list[Markup]:

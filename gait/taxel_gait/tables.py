@@ -7,7 +7,7 @@ import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,21 @@ __all__ = [
     "KEYS",
     "SUMMED",
     "SYMMETRIES",
+    "Curves",
     "Means",
     "Summary",
     "Table",
     "columns_of",
     "curves",
     "figure",
+    "load_name",
     "means_of",
     "summary",
     "symmetry",
 ]
+
+#: Mean and SD over stance of each region, by person, condition, foot, and the name of the load.
+Curves: TypeAlias = dict[tuple[str, str, str, str], dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]]
 
 #: What names a step, and says whether it counts.
 KEYS = ("recording", "person", "condition", "foot", "step", "bout", "region", "used")
@@ -86,6 +91,11 @@ def columns_of(rows: Iterable[Mapping[str, Any]], last: Sequence[str] = ()) -> l
     found = dict.fromkeys(name for row in rows for name in row)
     keys = [name for name in KEYS[:-1] if name in found]
     return [*keys, *(name for name in found if name not in (*KEYS, *last)), *last, KEYS[-1]]
+
+
+def load_name(row: Mapping[str, Any]) -> str:
+    """Return the name of the load of a row, with its unit: "force_N"; "" of a step that is cut."""
+    return next((name.removeprefix("mean_") for name in row if name.startswith("mean_")), "")
 
 
 class Means(NamedTuple):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -77,6 +78,32 @@ def test_both_feet_of_a_walk_are_measured_with_the_feet_that_are_stated(tmp_path
         ("w", "left", "slow"),
         ("w", "right", "slow"),
     ]
+
+
+def test_conditions_and_units_are_kept_apart_in_curves_and_on_the_page(tmp_path):
+    frames, _ = drawn(10.0)
+    for name, times in (("slow", 1), ("fast", 3)):
+        own = taxel.Frames(frames.values * times, frames.t, unit="kPa", array=frames.array)
+        taxel.convert(own, tmp_path / f"{name}.npz")
+    taxel.convert(taxel.Frames(frames.values, frames.t, unit="counts", array=frames.array), tmp_path / "raw.npz")
+    table_of = "recording,person,condition\nslow,anna,slow\nfast,anna,fast\nraw,bo,\n"
+    (tmp_path / "recordings.csv").write_text(table_of)
+    assert run(tmp_path, "-o", tmp_path / "out") == 0
+    _, points = table(tmp_path / "out" / "curves.csv")
+    most = {}
+    for row in points:
+        if row["region"] == "whole":
+            key = row["person"], row["condition"], row["load"]
+            most[key] = max(most.get(key, 0.0), float(row["mean"]))
+    slow, fast = most["anna", "slow", "force_N"], most["anna", "fast", "force_N"]
+    assert fast == pytest.approx(3 * slow)
+    # 100 mm2 a cell.
+    assert most["bo", "", "sum_counts"] == pytest.approx(slow / 100 * 1000)
+    page = (tmp_path / "out" / "report.html").read_text()
+    for words in ("<h2>anna slow</h2>", "<h2>anna fast</h2>", "<h2>bo</h2>", "force (N)", "sum (counts)"):
+        assert words in page
+    peaks = [float(cell) for cell in re.findall(r"<td>right</td><td>heel</td><td>([\d.]+)</td>", page)]
+    assert peaks[0] * 3 == pytest.approx(peaks[1], rel=1e-3)
 
 
 def test_wide_has_a_row_a_print(plate, tmp_path):

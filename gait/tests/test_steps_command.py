@@ -53,6 +53,31 @@ def test_a_walk_gives_tables_a_page_and_labels(walk, tmp_path, capsys):
     assert "78 steps" in capsys.readouterr().out
 
 
+def test_what_is_empty_names_the_recordings_and_curves_name_their_load(tmp_path):
+    t, left, right = two_feet()
+    write(tmp_path / "GaCo01_01.txt", t, left, right)
+    grid = np.stack([left, left], 1)[:, None] / np.array([10.0, 5.0])
+    frames = taxel.Frames(grid, (1e6 * t).astype(np.int64), unit="kPa", array=taxel.Array(1, 2, pitch_mm=10.0))
+    taxel.convert(frames, tmp_path / "grid.npz")
+    assert run(tmp_path, "-o", tmp_path / "out") == 0
+    about, _ = table(tmp_path / "out" / "steps.csv")
+    assert "# empty: step_s: needs both feet, of grid" in about
+    assert "# empty: contact_area_cm2: the area of a taxel is not known, of GaCo01_01" in about
+    assert "# empty: cpei_pct: is measured on footprints of a plate" in about
+    _, points = table(tmp_path / "out" / "curves.csv")
+    assert {row["load"] for row in points} == {"force_N"}
+
+
+def test_a_table_that_a_row_names_is_measured_beside_files_of_a_maker(tmp_path):
+    t, left, right = two_feet()
+    write(tmp_path / "GaCo01_01.txt", t, left, right)
+    np.savetxt(tmp_path / "plain.csv", np.stack([t, left], 1), "%.4f", ",", header="time_s,N", comments="")
+    (tmp_path / "recordings.csv").write_text("recording,person\nGaCo01_01,anna\nplain.csv,bo\n")
+    assert run(tmp_path, "-o", tmp_path / "out") == 0
+    _, rows = table(tmp_path / "out" / "steps.csv")
+    assert {(row["recording"], row["person"]) for row in rows} == {("GaCo01_01", "anna"), ("plain", "bo")}
+
+
 def test_without_a_folder_the_labels_are_beside_the_recording(walk, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run(walk) == 0

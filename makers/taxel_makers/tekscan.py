@@ -20,6 +20,7 @@ _LENGTHS_MM = {"mm": 1.0, "millimeters": 1.0, "cm": 10.0, "centimeters": 10.0, "
 #: Tekscan's names of units, and ours; any other name is not changed.
 _UNITS = {"kpa": "kPa", "raw": "counts"}
 _KEY = re.compile(r"([A-Z][A-Z0-9_]*)[ \t]+(\S.*?)[, \t]*")
+_NUMBER = re.compile(r"\d{1,9}(\.\d{1,9})?", re.ASCII)
 _FRAME = re.compile(r"Frame\s+(\d+)\s*(?:,\s*([\d.]+)\s*,)?", re.ASCII)
 
 
@@ -88,5 +89,8 @@ def read(path: Path, _layout: Layout | None = None) -> list[InMemory]:
         frames = Frames(np.nan_to_num(values), t, unit=_UNITS.get(stated.lower(), stated), array=array)
     except ProblemError as error:
         raise unreadable(str(error), path) from None
-    torn = len(begins) - len(whole)
-    return [InMemory(Facts(path=path, array=array, kind="tekscan", lost=("a frame that is cut off",) * torn), frames)]
+    lost = ("a frame that is cut off",) * (len(begins) - len(whole))
+    end, _, unit = header.get("SATURATION_PRESSURE", "").partition(" ")
+    # Cells are printed as whole numbers, a step of the hardware being larger.
+    range_end = float(int(float(end))) if unit.strip().lower() == stated.lower() and _NUMBER.fullmatch(end) else None
+    return [InMemory(Facts(path=path, array=array, kind="tekscan", range_end=range_end, lost=lost), frames)]

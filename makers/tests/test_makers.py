@@ -85,6 +85,16 @@ def test_an_excerpt_of_tekscan_is_read_as_by_hand(
     assert frames.t.tolist() == t
 
 
+@pytest.mark.parametrize(
+    ("unit", "stated", "end"), [("KPa", "1514.73 KPa", 1514.0), ("raw", "1514.73 KPa", None), ("KPa", "much KPa", None)]
+)
+def test_the_end_of_the_range_is_that_of_the_header_in_the_unit_of_the_cells(
+    tmp_path: Path, unit: str, stated: str, end: float | None
+) -> None:
+    file = write_tekscan(tmp_path, lambda rows: [*rows[:5], f"SATURATION_PRESSURE {stated} ", *rows[5:]], unit=unit)
+    assert taxel.open(file).range_end == end
+
+
 def test_a_missing_frame_unequal_spacings_and_a_filled_up_row(tmp_path: Path) -> None:
     frames = only(write_tekscan(tmp_path, unit="KPa", name="press.asf"))
     assert frames.t.tolist() == [0, 32_000, 64_000, 128_000, 160_000]

@@ -246,6 +246,8 @@ class Facts:
         The number that readings were subtracted from, as they fall with pressure (`falls` of a layout file).
     frame_us : float, us, optional
         Time from one frame to the next, by which a readout knew live when a frame was over.
+    range_end : float, in the unit of the frames, optional
+        The value at which the range of a taxel ends, if the file states it.
     raw : {"datagrams", ""}
         What was received that the reader holds too.
     begins_us : int, us, optional
@@ -279,6 +281,7 @@ class Facts:
     columns: tuple[str, ...] = ()
     turned: float | None = None
     frame_us: float | None = None
+    range_end: float | None = None
     raw: str = ""
     begins_us: int | None = None
     remarks: tuple[str, ...] = ()

@@ -77,7 +77,8 @@ def info(
     regions
         Measure the load of each region of this .json, such as NAME.regions.json (docs/files.md).
     range_end
-        With --regions: the value at which the range of a taxel ends; taxels that reach it are counted.
+        With --regions: the value at which the range of a taxel ends; taxels that reach it are counted. Default: that
+        which the file states (F-Scan).
     each
         Print all facts about each recording of a folder.
     """

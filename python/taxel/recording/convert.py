@@ -140,6 +140,7 @@ def _beside_table(source: SourceView, kind: str) -> list[str]:
         "the values at the beginning": marks.held is not None,
         "the side": bool(facts.side),
         "the place of the heel": bool(facts.heel),
+        "the end of a taxel's range": facts.range_end is not None,
         "the names of the columns": bool(facts.columns),
         "that readings were inverted": facts.turned is not None,
         "the remarks": bool(facts.remarks),

@@ -295,6 +295,11 @@ class Recording:
         return self._main.facts.side
 
     @property
+    def range_end(self) -> float | None:
+        """The value at which the range of a taxel ends, in the unit of the frames; None if no file states it."""
+        return self._main.facts.range_end
+
+    @property
     def heel(self) -> str:
         """Place of the heel on the sensor, "top" or "bottom"; "" if not stated."""
         return self._main.facts.heel

@@ -68,7 +68,7 @@ def info(
     regions : sequence of Region
         Those whose load is measured too; of several sensors each on its source.
     range_end : float, in the recording's unit, optional
-        The value at which the range of a taxel ends: how many of each region reach it is counted.
+        The value at which the range of a taxel ends: how many of each region reach it is counted. Default: as stated.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def info(
             found = Info(_sources(recording, tare, parts, end), None)
         else:
             given = None if tare is None else rest(recording, tare)
-            pressed = series(recording, given, parts, end)
+            pressed = series(recording, given, parts, recording.range_end if end is None else end)
             found = Info(summary(recording, pressed), pressed)
     return replace(found, warnings=tuple(warnings))
 
@@ -132,7 +132,9 @@ def _sources(
     for name, source in recording.sources.items():
         given = None if tare is None or source.is_stream else rest(source, tare)
         own = [region for region in parts if region.source == name]
-        facts = summary(source, None if source.is_stream else series(source, given, own, end))
+        facts = summary(
+            source, None if source.is_stream else series(source, given, own, source.range_end if end is None else end)
+        )
         if source.is_stream:
             facts["columns"] = source.columns
         clock = source.clock
