@@ -3,7 +3,7 @@
 Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant is called for a whole matrix of trains
 (``victor_purpura_distance``, ``van_rossum_distance``), as are we (``taxel.metrics.pairwise``); its calls on two trains
 take 2 to 20 times as long a pair as its matrices. Ours are called several times in a round, so that the time can be
-measured. One thread. The large matrices of figure 5.11 are measured by `drop_distances`.
+measured. One thread.
 
 Peer: elephant. Unit: pairs per CPU second. Goal: Victor-Purpura 300 times, van Rossum 50 times elephant's speed, and
 the same distances.

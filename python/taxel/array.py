@@ -432,8 +432,10 @@ class Array:
         return True
 
     def _part(self, x: slice, y: slice) -> Array:
-        """Return a rectangle of columns `x` and rows `y`, which holds a taxel, as a separate sensor."""
+        """Return a rectangle of columns `x` and rows `y` as a separate sensor; refuse one without a taxel."""
         (left, right), (top, bottom) = self.region(x, y)
+        if right <= left or bottom <= top:
+            raise ProblemError(f"region {x}, {y}: no taxel of {self!r} is in it")
         rows, columns = slice(top, bottom), slice(left, right)
         exists = None if self.exists is None else self.exists[rows, columns]
         places = None if self.places is None else self.places._part(rows, columns)

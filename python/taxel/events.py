@@ -163,7 +163,7 @@ class Events(FrozenColumns):
         return selected
 
     def region(self, x: slice, y: slice) -> Events:
-        """Return the events of a rectangle of columns `x` and rows `y` (slices without a step), on the same array.
+        """Return the events of a rectangle of columns `x` and rows `y` as those of a smaller array, as of `Frames`.
 
         Parameters
         ----------
@@ -172,17 +172,18 @@ class Events(FrozenColumns):
 
         Raises
         ------
-        ProblemError : not slices of whole numbers, or a slice with a step
+        ProblemError : not slices of whole numbers, a slice with a step, or no taxel
 
         Examples
         --------
         >>> events = Events([0, 192], [3, 4], [5, 5], [True, False], array=Array(8, 8))
         >>> events.region(slice(4, 8), slice(None)).x
-        array([4], dtype=uint16)
+        array([0], dtype=uint16)
         """
-        columns, rows = self.array.region(x, y)
-        inside = (self.x >= columns[0]) & (self.x < columns[1]) & (self.y >= rows[0]) & (self.y < rows[1])
-        return self[inside]
+        (left, right), (top, bottom) = self.array.region(x, y)
+        inside = self[(self.x >= left) & (self.x < right) & (self.y >= top) & (self.y < bottom)]
+        places = {"x": inside.x - np.uint16(left), "y": inside.y - np.uint16(top)}
+        return self._unchecked(self.array._part(x, y), self.markers, **inside._columns | places)
 
     def sorted(self) -> Events:
         """Return the same events and markers in order of time; those with equal times keep their order.
@@ -276,13 +277,6 @@ class Events(FrozenColumns):
         same = self[:]
         same.array = array
         return same
-
-    def _part(self, x: slice, y: slice) -> Events:
-        """Return the events of a rectangle of columns `x` and rows `y` as those of a smaller array."""
-        (left, _), (top, _) = self.array.region(x, y)
-        inside = self.region(x, y)
-        places = {"x": inside.x - np.uint16(left), "y": inside.y - np.uint16(top)}
-        return self._unchecked(self.array._part(x, y), self.markers, **inside._columns | places)
 
     def to_numpy(self) -> NDArray[np.void]:
         """Return a record for each event: ``t x y p``, with ``intensity present`` and ``repaired`` if there are any."""

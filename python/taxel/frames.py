@@ -229,10 +229,8 @@ class Frames(FrozenColumns):
             return self._loads(x, above, range_end)
         y = slice(None) if y is None else y
         columns, rows = self.array.region(x, y)
-        values = self.values[:, slice(*rows), slice(*columns)]
-        if 0 in values.shape[1:]:
-            raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} is in it")
-        return Frames(values, self.t, unit=self.unit, array=self.array._part(x, y))
+        array, values = self.array._part(x, y), self.values[:, slice(*rows), slice(*columns)]
+        return Frames(values, self.t, unit=self.unit, array=array)
 
     def _loads(self, region: Region, above: float, range_end: float | None) -> dict[str, Values]:
         """Return what loads a region (`region`)."""

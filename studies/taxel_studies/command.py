@@ -82,7 +82,7 @@ def study(
     if name is None:
         say(*(f"{one:<16}{title}" for one, title in STUDIES.items()))
         return
-    wanted = _every(options, workers) if name == "all" else [_named(name)]
+    wanted = _every(options) if name == "all" else [_named(name)]
     sections = {}
     try:
         for one in wanted:
@@ -113,19 +113,14 @@ def _named(name: str) -> str:
     return FIGURES.get(name, name)
 
 
-def _every(options: StudyOptions, workers: Workers) -> list[str]:
-    """Return the studies that can be run here, say why others are left out, and how long all take."""
-    from taxel_studies.study import forecast  # noqa: PLC0415  matplotlib loads slowly
-
+def _every(options: StudyOptions) -> list[str]:
+    """Return the studies that can be run here, and say why others are left out."""
     why = {}
     for name in STUDIES:
         load(name).set(options.size)  # refused before any study begins
         why[name] = load(name).cannot_run(options.recordings)
     say(*(f"{name}: left out, {reason}" for name, reason in why.items() if reason), err=True)
-    wanted = [name for name, reason in why.items() if reason is None]
-    if not options.json and (text := forecast(wanted, options.size, workers.jobs)):
-        say(f"all: {text}; what is there already is not computed again", err=True)
-    return wanted
+    return [name for name, reason in why.items() if reason is None]
 
 
 def tell(section: dict[str, Any]) -> None:

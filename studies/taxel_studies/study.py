@@ -38,7 +38,6 @@ __all__ = [
     "Table",
     "Task",
     "drawn",
-    "forecast",
     "grid",
     "listed",
     "logarithmic",
@@ -57,43 +56,6 @@ Parameters = Mapping[str, Any]
 Summary = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
-
-
-#: The size of the kept run of each study that took a minute or more, and its seconds of CPU, on one core of an AMD EPYC
-#: or an Intel Xeon; `studies/tests/test_kept_figures.py` compares them with the kept figures.
-CPU_SECONDS = {
-    "contact": ("full", 3421),
-    "asynchronous": ("full", 279),
-    "drops": ("full", 294),
-    "fa1": ("full", 217),
-    "foam": ("full", 208),
-    "fig5.5": ("full", 5152),
-    "fig5.7": ("full", 1257),
-    "fig5.11": ("full", 728),
-    "fig6.7": ("full", 2340),
-    "fig6.9": ("full", 172),
-    "fig6.10": ("full", 240),
-    "fig6.15": ("full", 339),
-    "gait": ("full", 352),
-    "rivals": ("full", 2437),
-    "stdp": ("full", 2520),
-}
-
-
-def forecast(names: Sequence[str], size: str, jobs: int) -> str:
-    """Return about how long studies take, and how that is known; "" below a minute and where it is not.
-
-    Examples
-    --------
-    >>> forecast(["gait"], "full", 1)
-    'about 6 min with 1 of --jobs: the kept runs took 352 s of CPU'
-    """
-    cpu_s = sum(CPU_SECONDS[name][1] for name in names if CPU_SECONDS.get(name, ("", 0))[0] == size)
-    minutes = cpu_s / jobs / 60
-    if minutes < 1:
-        return ""
-    lasts = f"{minutes:.0f} min" if minutes < 90 else f"{minutes / 60:.1f} h"
-    return f"about {lasts} with {jobs} of --jobs: the kept runs took {cpu_s} s of CPU"
 
 
 @dataclass(frozen=True)
@@ -288,9 +250,6 @@ class Study:
             given["data"] = self._recordings(data)
             _say(quiet, f"{self.name}: reading the recordings in {data}; hundreds of them take minutes")
         tasks = self.tasks(parameters, **_named(self.tasks, given))
-        if text := forecast([self.name], size, workers.jobs):
-            left = sum(not kept.has(self.realise, task) for task in tasks) / max(1, len(tasks))
-            _say(quiet, f"{self.name}: {text}, and {100 * left:.0f} % of it is to be computed")
         options: dict[str, Any] = {"kept": kept, "workers": workers, "quiet": quiet}
         first = [Task({"call": call}) for call in (self.shared(parameters) if self.shared else ())]
         made = run(make, first, given=given, title=f"{self.name}, what is shared", **options) if first else []

@@ -132,7 +132,7 @@ def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:
     side, pitch = reduction.bin or 1, sensor.pitch_mm
     wider = pitch and ((pitch[0] * side, pitch[1] * side) if isinstance(pitch, tuple) else pitch * side)
     array = Array(-(-(bottom - top) // side), -(-(right - left) // side), wider, name=sensor.name)
-    x, y = ((at - at.dtype.type(begin)) // at.dtype.type(side) for at, begin in ((kept.x, left), (kept.y, top)))
+    x, y = (at // at.dtype.type(side) for at in (kept.x, kept.y))
     window_us = reduction.window_us
     if window_us is None:
         return Events(kept.t, x, y, kept.p, markers=kept.markers, array=array)

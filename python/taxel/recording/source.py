@@ -93,10 +93,7 @@ class SourceView:
     @cached_property
     def table(self) -> Events | Frames:
         """The events or the frames."""
-        table = self._table
-        if not self._is_part:
-            return table
-        return table._part(*self._inside) if isinstance(table, Events) else table.region(*self._inside)
+        return self._table.region(*self._inside) if self._is_part else self._table
 
     @property
     def _table(self) -> Events | Frames:

@@ -1,4 +1,23 @@
-//! A frame in the bytes that clients receive: protocol.md, *Frames*.
+//! A frame in the bytes that clients receive, which `python/taxel/panel/web/protocol.js` reads.
+//!
+//! Numbers are little-endian. The header of 136 bytes has rows and columns, the board's time, flags, the number of the
+//! first column of time and how many there are (1250 at most; column k begins at k times its width, 4000 us or what
+//! `zoom` requested), and from byte 64 on first byte and length of each section, 0 if it is missing. Each begins at a
+//! multiple of 8:
+//!
+//! 0. pressure, u16 a taxel, row by row: the held value; 65535: none yet
+//! 1. change, i8 a taxel: the largest recent change, ticks; it decays by a sixteenth each 4 ms. Without values each
+//!    change counts 16
+//! 2. raster, u8 x time columns x rows: ups (low 4 bits) and downs (high 4 bits) of a row in a column, 15 at most
+//! 3. curves, 32 bytes a time column: least and greatest of each value: u32 sums of ticks above rest (for frames with
+//!    `newtons`, weighted by area); u32 taxels above rest; f32 x and f32 y of the centre. Without a value the least is
+//!    above the greatest; the centre is NaN if nothing is pressed, if noise can add up to the sum, and for channels
+//! 4. history, 3 x u16 a time column: the watched taxel: least, greatest, last; 65535: unknown
+//! 5. rest, u16 a taxel; 65535: unknown
+//! 6. values, 16 bytes x (1 + sources): at the frame's time, of all taxels and of each source: u32 sum, u32 taxels above
+//!    rest (2^32 - 1: no value), f32 x and y of the centre
+//! 7. channels, 2 x u16 x time columns x taxels: for 64 channels at most: least and greatest ticks above rest
+//! 8. sources, 32 bytes x time columns x sources: for frames of two to four sources: curves of each
 
 use crate::columns::{COLUMN_US, Curve, Curves, SPAN, column_of};
 use crate::frame_values::RestSource;
