@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -113,15 +114,15 @@ def steps(
         work = partial(_measure, by_entry, options, reading)
         found, failed = running.run(cohort.entries, work, stamps, folder, workers, show)
     measured = dict[Entry, Measured]()
-    for k, entry in enumerate(cohort.entries):
-        # Of many recordings each is held once.
-        values, found[k] = found[k], None
-        if values is not None:
-            measured[entry] = Measured.from_dict(values)
-    for entry, one in measured.items():
+    for entry, file in zip(cohort.entries, found, strict=True):
+        if file is None:
+            continue
+        one = Measured.from_dict(running.read(file))
         for table, labels in zip(by_entry[entry], one.labels, strict=True):
             table.parent.mkdir(parents=True, exist_ok=True)
             kept.write(table, labels)
+        # Of many recordings all the labels would be much.
+        measured[entry] = replace(one, labels=[])
     rows = [row for one in measured.values() for row in one.rows]
     say_warnings(dict.fromkeys(text for one in measured.values() for text in one.warnings))
     left_out = {**cohort.left_out, **failed}

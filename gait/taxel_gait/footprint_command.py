@@ -81,7 +81,10 @@ def footprint(
     with progress(output.json) as show:
         work = partial(_work, options, reading, folder)
         found, failed = running.run(people, work, stamps, folder, workers, show)
-    measured = [Footprints(**one) for one in found if one is not None]
+    by_person = {
+        one.name: Footprints(**running.read(file)) for one, file in zip(people, found, strict=True) if file is not None
+    }
+    measured = list(by_person.values())
     left_out = {**cohort.left_out, **failed, **{k: v for one in measured for k, v in one.failed.items()}}
     say_warnings(dict.fromkeys(text for one in measured for text in one.warnings))
     say(*(f"taxel: {why if name in why else f'{name}: {why}'}" for name, why in left_out.items()), err=True)
@@ -92,7 +95,7 @@ def footprint(
             say(f"taxel: {cohort.place}: no footprint was found, so no table is written", err=True)
         return WRONG_INPUT
     regions = [row for one in measured for row in one.regions]
-    feet = {person.name: one["feet"] for person, one in zip(people, found, strict=True) if one is not None}
+    feet = {name: one.feet for name, one in by_person.items()}
     for name, by_side in feet.items():
         for side, foot in by_side.items():
             file = mask_file(folder, name, side, options.mask)

@@ -32,7 +32,7 @@ _HEEL, _FOREFOOT, _ROUNDS, _TURN = (0.05, 0.30), (0.55, 0.80), 3, 25.0
 _VOTE, _UNDECIDED = 0.12, 0.01
 #: Of a whole print: length over width; where the path of the centre is in the first and in the last twentieth of its
 #: frames, shares of the length; and the width of what lies ahead of a share of the length, in widths of the forefoot.
-_SLENDER, _BEGINS, _ENDS, _TIP, _TIP_WIDTH = (2.3, 3.6), (0.06, 0.30), (0.75, 0.97), 0.96, 0.72
+_SLENDER, _BEGINS, _ENDS, _TIP, _TIP_WIDTH = (2.3, 3.6), (0.06, 0.20), (0.72, 0.97), 0.96, 0.72
 #: No foot is longer or wider than this, mm: then there are two.
 _LARGEST = (340.0, 150.0)
 

@@ -18,7 +18,7 @@ from taxel.tasks import Workers
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-__all__ = ["clear", "found_anywhere", "run", "stamp", "why"]
+__all__ = ["clear", "found_anywhere", "read", "run", "stamp", "why"]
 
 #: The folder of what is known so far of a run that has not ended.
 PARTS = ".parts"
@@ -44,10 +44,11 @@ def run(
     folder: Path,
     workers: Workers,
     show: Callable[[str, int, int], object],
-) -> tuple[list[dict[str, Any] | None], dict[str, str]]:
-    """Return what each recording or person gave, None where it failed, and why some failed.
+) -> tuple[list[Path | None], dict[str, str]]:
+    """Return the file of what each recording or person gave (`read`), None where it failed, and why some failed.
 
-    What is known so far is kept in the folder until `clear`, so that a run that was stopped goes on.
+    What is known so far is kept in the folder until `clear`: so a run that was stopped goes on, and memory holds the
+    results of one at a time.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def run(
     parts = folder / PARTS
     parts.mkdir(exist_ok=True)
     files = [parts / f"{one}.json" for one in stamps]
-    found: list[dict[str, Any] | None] = [json.loads(file.read_text()) if file.exists() else None for file in files]
+    found = [file if file.exists() else None for file in files]
     wanted = [k for k, one in enumerate(found) if one is None]
     failed, done = dict[str, str](), len(entries) - len(wanted)
     for at, (result, failure) in workers.run(partial(_tried, work), [entries[k] for k in wanted]):
@@ -74,10 +75,15 @@ def run(
         if result is None:
             failed[entries[k].name] = failure
             continue
-        found[k] = result
+        found[k] = files[k]
         text = json.dumps(result).encode()
         write_whole(files[k], lambda file, text=text: file.write(text), overwrite=True)  # type: ignore[misc]
     return found, {entry.name: failed[entry.name] for entry in entries if entry.name in failed}
+
+
+def read(file: Path) -> dict[str, Any]:
+    """Return what a recording or a person gave."""
+    return dict(json.loads(file.read_text()))
 
 
 def found_anywhere(options: _O) -> _O:
