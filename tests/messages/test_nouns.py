@@ -61,6 +61,7 @@ PLACES: dict[str, Callable[[], object]] = {
     "frames of events, number": lambda: Frames.from_events(Events(**EVENTS, intensity=[1, 2]), 1, 0, 10**15),
     "frames of events, values": lambda: Frames.from_events(Events(**EVENTS), 100),
     "frames, backwards": lambda: Frames(np.zeros((2, 2, 2)), [0, 1])[::-1],
+    "frames, two at a time": lambda: Frames._joined([still(), still()]),
     "frames, region": lambda: still().region(slice(1, 1), slice(None)),
     "region, nothing": lambda: Region("a"),
     "region, no name": lambda: Region("", taxels=((0, 0),)),
