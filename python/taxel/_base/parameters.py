@@ -183,8 +183,9 @@ class Parameters:
 
     def __repr__(self) -> str:
         plain, defaults = json.loads(self._json()), self._described()["defaults"]
-        differ = [name for name in plain if name not in defaults or plain[name] != defaults[name]]
-        settings = (f"{name}={value!r}" for name, value in self._values().items() if name in differ)
+        own = {name: value for name, value in self._values().items() if value is not None or not self._stands_for(name)}
+        differ = (name for name in own if name in plain and (name not in defaults or plain[name] != defaults[name]))
+        settings = (f"{name}={own[name]!r}" for name in differ)
         return f"{type(self).__name__}({', '.join(settings)})"
 
 
