@@ -39,11 +39,3 @@ def messages(calls: dict[str, Callable[[Path], object]], folder: Path) -> dict[s
             said[name] = f"{type(error).__name__}({error.argument or ''}): {error}".replace(str(folder), "DIR")
         assert len(said.get(name, "").splitlines()) == 1, name
     return said
-
-
-@contextmanager
-def refused_saying(said: str, kind: type[Error] = ProblemError) -> Iterator[pytest.ExceptionInfo[Error]]:
-    """Expect an error whose sentence contains a regular expression, in rooms whose tests quote sentences yet."""
-    with pytest.raises(kind, match=said) as caught:
-        yield caught
-    assert "\n" not in str(caught.value)

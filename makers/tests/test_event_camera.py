@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats.event_files import some_rows, write
-from refusal import refused_saying as refused
+from refusal import refused
 
 import taxel
 from taxel import Events, FormatError, Frames
+from taxel._base.errors import Place
 from taxel.cli import main
 from taxel.formats.event_camera import Reduction
 from taxel.tasks import Training
@@ -155,20 +156,18 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
     rows = np.concatenate([noise, *bursts]).astype(np.int64)
     path = write(tmp_path / "a.raw", rows[np.argsort(rows[:, 0], kind="stable")])
     labels = [{"contact": begins.tolist()}]
-    with refused(
-        "the events have no intensities, but the recipe touch and its encoders need them: for an event camera"
-    ):
+    with refused():
         taxel.train(taxel.open(path), labels)
     training = taxel.train(taxel.open(path, bin=4, count_ms=5), labels)
     assert training.score["contact"].found == 12
     assert any("recipe event_counts" in line for line in training.lines())
     frames = taxel.open(path, bin=4, count_ms=5).frames()
     assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
-    with refused("in events/2 ms, but the readout was trained on events/5 ms"):
+    with refused():
         taxel.detect.run(training.readout, taxel.open(path, bin=4, count_ms=2).frames())
     on = taxel.open(path, bin=4, count_ms=5, polarity="on").frames()
     for detector in (training.readout, taxel.detect.PlainRule("area", 2, unit="events/5 ms")):
-        with refused("in on events/5 ms, but the .* was trained on events/5 ms"):
+        with refused():
             taxel.detect.run(detector, on, tare=taxel.Tare.take(on, stop_us=500_000))
 
 
@@ -196,18 +195,22 @@ def test_weak_bursts_are_learnt_among_hot_pixels_and_noise_that_grows(tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("argument", "options"),
     [
-        ({"region": "0:65,0:48"}, "region is '0:65,0:48'"),
-        ({"region": "1,2"}, "region is '1,2': must be columns A:B and rows C:D"),
-        ({"bin": 0}, "bin is 0"),
-        ({"count_ms": 0.0015}, "count_ms is 0.0015: must be a whole number of us"),
-        ({"count_ms": 0}, "count_ms is 0"),
-        ({"polarity": "red"}, "polarity is 'red': must be one of 'both', 'on', 'off'"),
+        ("region", {"region": "0:65,0:48"}),
+        ("region", {"region": "1,2"}),
+        ("bin", {"bin": 0}),
+        ("bin", {"bin": 65}),
+        ("bin", {"bin": 9, "region": "0:8,0:4"}),
+        ("count_ms", {"count_ms": 0.0015}),
+        ("count_ms", {"count_ms": 0}),
+        ("polarity", {"polarity": "red"}),
     ],
 )
-def test_an_option_that_does_not_fit_is_one_clear_error(options: dict[str, object], said: str, tmp_path: Path) -> None:
-    with refused(said):
+def test_an_option_that_does_not_fit_is_refused_by_name(
+    argument: str, options: dict[str, object], tmp_path: Path
+) -> None:
+    with refused(argument=argument):
         taxel.open(write(tmp_path / "a.raw", some_rows()), **options)
 
 
@@ -216,7 +219,7 @@ def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> 
     one = {"array": taxel.Array(4, 4), "intensity": [7]}
     taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
     for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
-        with refused("region, bin, count_ms and polarity are only for events without intensities"):
+        with refused():
             taxel.open_all(place, bin=2)
 
 
@@ -249,15 +252,6 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, count_ms: f
         assert frames.unit == counts.unit
 
 
-def test_taxels_beyond_the_sensor_are_refused(tmp_path: Path) -> None:
-    file = write(tmp_path / "a.raw", some_rows())
-    with refused(r"bin is 65: must be a whole number from 1 to 64"):
-        taxel.open(file, bin=65)
-    with refused(r"bin is 9: must be a whole number from 1 to 8"):
-        taxel.open(file, bin=9, region="0:8,0:4")
-    assert taxel.open(file, bin=64).array.shape == (1, 1)
-
-
 def test_the_size_that_a_header_lacks_is_given_or_in_a_layout(tmp_path: Path) -> None:
     file = write(tmp_path / "a.raw", some_rows())
     whole = taxel.open(file).events
@@ -265,7 +259,7 @@ def test_the_size_that_a_header_lacks_is_given_or_in_a_layout(tmp_path: Path) ->
     lines = [line for line in header(data).splitlines(keepends=True) if b"eometry" not in line]
     bare = b"".join(line.split(b";")[0].rstrip() + b"\n" for line in lines)
     file.write_bytes(bare + data.removeprefix(header(data)))
-    with refused("the header does not state the size of the sensor", FormatError):
+    with refused(FormatError, argument="array", place=Place("a.raw")):
         taxel.open(file)
     assert taxel.open(file, array=taxel.Array(*whole.array.shape)).events.t.tolist() == whole.t.tolist()
     rows, columns = whole.array.shape

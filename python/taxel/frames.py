@@ -330,6 +330,8 @@ class Frames(FrozenColumns):
         """Return the frames of one sensor and unit in order of time."""
         t = np.concatenate([table.t for table in tables])
         order = np.argsort(t, kind="stable")
+        if len(twice := np.flatnonzero(np.diff(t[order]) == 0)):
+            raise ProblemError(f"two frames are at {t[order][twice[0]]} us: put one recording after another by a gap")
         values = np.concatenate([table.values for table in tables])[order]
         return cls(frozen(values), t[order], unit=tables[0].unit, array=tables[0].array)
 

@@ -46,20 +46,6 @@ def test_e_learning_adds_removes_and_moves_at_least_cost(seed):
     assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
-def test_a_late_spike_raises_weights_and_an_early_one_lowers_them():
-    (pattern,), _ = patterns(1, trains=60, count=1)
-    learner = Chronotron(rule="E", **GIVEN)
-    weights = np.full(60, 2.0)
-    first = learner.change(weights, pattern, [100.0])[1][:1]
-    silent = np.zeros(60)
-    only = learner.change(weights, pattern, first)[1]
-    assert len(only) > 0
-    late = learner.change(weights, pattern, only - 2.0)[0]
-    early = learner.change(weights, pattern, only + 2.0)[0]
-    assert late.sum() > 0 > early.sum()
-    assert learner.change(silent, pattern, [100.0])[0].sum() > 0
-
-
 def filled(learner):
     """The parameters as the compiled part has them, with all that was left out."""
     return _rules.check_parameters("chronotron", learner._json())

@@ -66,13 +66,6 @@ def test_the_kernel_of_filt_is_the_integral_over_the_filtered_spike():
         assert filtered(np.array(s)) == pytest.approx(of_filter, abs=1e-6)
 
 
-def test_a_filter_of_no_length_is_inst():
-    (pattern,), (wanted,) = patterns(2, trains=60, count=1)
-    weights = np.random.default_rng(2).uniform(-1, 4, 60)
-    sharp, inst = FILT(tau_q=1e-9).change(weights, pattern, wanted), INST().change(weights, pattern, wanted)
-    assert sharp[0] == pytest.approx(inst[0], abs=1e-6)
-
-
 def test_defaults_of_inst_are_those_of_gardner_and_gruning():
     """Peak 1 mV at 7 ms; eta 600/(N n_s p), weights from 0 to 200/N."""
     (pattern,), _ = patterns(2, trains=1, count=1)

@@ -5,11 +5,9 @@ import pytest
 from making import made
 from rule_examples import kernel, patterns
 
-from taxel import Neuron
 from taxel.learn import ConeX, ConeXProblem
 from taxel_rules import HTP
 
-linprog = pytest.importorskip("scipy.optimize").linprog
 GIVEN = {"initial": (0.0, 1.0), "updates": "pattern", "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
 STEP = 0.1
 
@@ -57,25 +55,6 @@ def test_what_is_corrected_are_broken_rows_of_cone_x(window, seed):
     assert change == pytest.approx(demands(learner, pattern, wanted, weights), rel=1e-9, abs=1e-9)
 
 
-def test_what_meets_the_rows_of_cone_x_is_not_corrected():
-    """One way round: a solution of CONE-X's rows, got from a linear programme, leaves HTP nothing to do."""
-    (pattern,), (wanted,) = patterns(7, trains=80, count=1, targets=3, spikes=2)
-    at, silent, _ = cone_x_rows(pattern, wanted)
-    found = linprog(
-        np.zeros(80),
-        A_ub=silent,
-        b_ub=np.full(len(silent), 15.0 - 1e-3),
-        A_eq=at,
-        b_eq=np.full(3, 15.0 + 1e-9),
-        bounds=(-100, 100),
-    )
-    assert found.status == 0
-    learner = HTP(window_ms=0.0, eta=1.0, epochs=1, **GIVEN)
-    assert not learner.change(found.x, pattern, wanted)[0].any()
-    broken = found.x * 1.01  # the potential now comes to the threshold before its target
-    assert learner.change(broken, pattern, wanted)[0].any()
-
-
 def cone_x(**options):
     """CONE-X with HTP's neuron: no refractory time, no threshold rise; bounds far out."""
     bare = {"theta_plus": 0.0, "refractory": 0.0, "after_spike": "reset", "lb": -50.0, "ub": 50.0}
@@ -96,17 +75,3 @@ def test_the_rows_that_cone_x_states_are_those_of_htp(seed):
         coefficients, limit = problem.silence(0, times[k])
         assert coefficients == pytest.approx(silent[k], abs=1e-9)
         assert limit == pytest.approx(0.3)
-
-
-def test_what_htp_ends_with_meets_the_rows_of_cone_x():
-    """The other way round, and the neuron of the house fires there."""
-    (pattern,), (wanted,) = patterns(8, trains=80, count=1, targets=2, spikes=2)
-    learner = HTP(window_ms=0.5, eta=0.02, epochs=4000, until_right=False, **GIVEN).fit([pattern], [wanted])
-    at, silent, times = cone_x_rows(pattern, wanted)
-    assert not learner.change(learner.weights_, pattern, wanted)[0].any()
-    assert np.all(at @ learner.weights_ >= 15.0 * (1 - 1e-9))
-    before = np.array([np.any((wanted - 0.5 <= t) & (t <= wanted)) for t in times])
-    assert np.all((silent @ learner.weights_)[~before] < 15.0)
-    fired = learner.neuron_.run(learner.weights_, pattern)
-    assert fired == pytest.approx(wanted, abs=1.0)
-    assert isinstance(learner.neuron_, Neuron)

@@ -140,10 +140,3 @@ def test_it_fires_between_inputs_where_the_potential_peaks_above_the_threshold(t
         assert 4.3 < after <= 4.621
         gained = 0.475 + neuron.a_plus * np.exp(-after / neuron.tau_plus)
         assert neuron.weights_ == pytest.approx(np.full(10, gained), abs=1e-12)
-
-
-def test_the_first_input_after_a_spike_loses_and_the_next_does_not():
-    neuron = STDP(threshold=4.0).fit([SpikeTrains.from_lists([[5.0]] * 10 + [[20.0, 30.0]], stop=200.0)])
-    assert len(neuron.spikes_) == 1
-    lost = 0.475 - neuron.a_minus * np.exp((neuron.spikes_[0] - 20.0) / neuron.tau_minus)
-    assert neuron.weights_[10] == pytest.approx(lost, abs=1e-12)

@@ -66,15 +66,6 @@ def test_a_double_exponential_current_is_filtered_once_more(tau, refractory):
     assert fired == pytest.approx(plain, abs=1e-9)
 
 
-def test_a_shift_in_time_moves_spikes_and_nothing_else():
-    (pattern,), _ = patterns(4, trains=60, count=1, spikes=2)
-    there = SpikeTrains.from_lists([t + 1000.0 for t in pattern], start=1000.0, stop=1200.0)
-    weights = np.random.default_rng(4).uniform(0, 5, 60)
-    here, moved = INST().change(weights, pattern, [100.0]), INST().change(weights, there, [1100.0])
-    assert moved[1] - 1000.0 == pytest.approx(here[1])
-    assert moved[0] == pytest.approx(here[0], rel=1e-9)
-
-
 def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
     trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
     for call in (

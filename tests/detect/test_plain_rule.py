@@ -66,6 +66,12 @@ def test_frames_that_begin_loaded_have_no_onset_and_an_end():
     assert [d.t for d in run(PlainRule("load", 1, noise_floor=FLOOR), frames, tare=rest)] == [20_000, 40_000]
 
 
+def test_t_is_when_the_load_passed_its_date_whatever_it_reads_on_the_way_to_the_level():
+    frames = Frames([[[v]] for v in (0.0, 6.0, 8.0, 7.0, 12.0, 6.0, 0.0)], range(0, 70_000, 10_000), array=Array(1, 1))
+    rule = PlainRule("load", 10, 0.2, date=0.5, labels=("on", None), noise_floor=0.5)
+    assert run(rule, frames, tare=tare(Array(1, 1), 0.0)).t.tolist() == [10_000]
+
+
 # The load by running range
 
 

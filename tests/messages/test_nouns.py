@@ -9,7 +9,6 @@ from refusal import messages
 
 import taxel
 from taxel import Array, Calibration, Detections, Events, Frames, Labels, Load, Places, Region, SpikeTrains, Tare
-from taxel._base.errors import helped
 
 ARRAY = Array(2, 2)
 TRAINS = SpikeTrains.from_lists([[1.0, 2.0], []], stop=5.0)
@@ -61,6 +60,7 @@ PLACES: dict[str, Callable[[], object]] = {
     "frames of events, number": lambda: Frames.from_events(Events(**EVENTS, intensity=[1, 2]), 1, 0, 10**15),
     "frames of events, values": lambda: Frames.from_events(Events(**EVENTS), 100),
     "frames, backwards": lambda: Frames(np.zeros((2, 2, 2)), [0, 1])[::-1],
+    "frames, two at a time": lambda: Frames._joined([still(), still()]),
     "frames, region": lambda: still().region(slice(1, 1), slice(None)),
     "region, nothing": lambda: Region("a"),
     "region, no name": lambda: Region("", taxels=((0, 0),)),
@@ -85,7 +85,6 @@ CALLS: dict[str, Callable[[Path], object]] = {
     **{f"offsets, {offsets}": lambda _, o=offsets: SpikeTrains([1.0, 2.0], o, 0.0, 5.0) for offsets in OFFSETS},
     **{f"{k} {v}": lambda _, v=v, k=k: SpikeTrains([1.0, 2.0], [0, 2], 0.0, 5.0, v, kind=k) for v, k in VALUES},
     **{name: lambda _, call=call: call() for name, call in PLACES.items()},
-    "remedy": lambda _: helped(taxel.ProblemError("text"), "tare", "pray"),
     "rows": lambda _: Array(0, 5),
     "columns": lambda _: Array(5, 65_536),
     "pitch": lambda _: Array(5, 5, -1.0),

@@ -6,6 +6,7 @@ import json
 import math
 import operator
 import os
+import re
 import sys
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, SupportsIndex, TypeVar
@@ -23,6 +24,8 @@ R = TypeVar("R")
 
 #: The most characters of a value that an error shows.
 _SHOWN = 60
+#: Half of a surrogate pair, which UTF-8 cannot hold.
+_HALF = re.compile("[\ud800-\udfff]")
 #: A window up to there is more likely stated in another unit, us.
 _SMALL_US = 10_000
 
@@ -35,7 +38,7 @@ def shown(value: object) -> str:
         words = " ".join(repr(_beginning(value)).split())
     except Exception:  # a caller's class may raise any error
         return f"a {type(value).__name__} that cannot be shown"
-    words = words.encode("ascii", "backslashreplace").decode() if _lone_surrogate(words) else words
+    words = words.encode("ascii", "backslashreplace").decode() if _HALF.search(words) else words
     return words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."
 
 
@@ -53,15 +56,6 @@ def _beginning(value: object, depth: int = 3) -> object:
     if type(value) is tuple and depth:
         return tuple(_beginning(entry, depth - 1) for entry in value[: _SHOWN + 1])
     return value
-
-
-def _lone_surrogate(value: str) -> bool:
-    """Return whether a text holds half of a surrogate pair, which UTF-8 cannot hold."""
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        return True
-    return False
 
 
 def instance(name: str, value: object, *kinds: type[T]) -> T:
@@ -169,7 +163,7 @@ def text(name: str, value: object, among: Collection[str] = ()) -> str:
     if not isinstance(value, str) or (among and value not in among):
         expected = f"one of {', '.join(map(repr, among))}" if among else "a text"
         raise refused(name, f" is {shown(value)}: must be {expected}")
-    if _lone_surrogate(value):
+    if _HALF.search(value):
         raise refused(name, f" is {shown(value)}: must be a text that UTF-8 can encode")
     return value
 

@@ -130,7 +130,5 @@ def damaged(path: str | PathLike[str], kind: str, why: str) -> FormatError:
 
 def helped(error: _Error, argument: str, hint: str) -> _Error:
     """Return the same error with a remedy, of which `argument` is what helps."""
-    if hint not in _REMEDIES:
-        raise refused("hint", f" is {hint!r}: must be one of {', '.join(_REMEDIES)}")
     error.argument, error.hint = argument, hint
     return error

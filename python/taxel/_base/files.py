@@ -8,7 +8,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -143,11 +143,8 @@ def check_writable(path: str | os.PathLike[str], *, overwrite: bool = False) -> 
     ------
     As `whole_file`.
     """
-    try:
-        with whole_file(path, overwrite=overwrite):
-            raise _Writable
-    except _Writable:
-        return
+    with suppress(_Writable), whole_file(path, overwrite=overwrite):
+        raise _Writable
 
 
 def _umask() -> int:

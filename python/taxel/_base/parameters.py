@@ -182,8 +182,10 @@ class Parameters:
         return tags.Tags(estimator_type=None, target_tags=tags.TargetTags(required=False), input_tags=tags.InputTags())
 
     def __repr__(self) -> str:
-        default = {name: entry.default for name, entry in signature(type(self)).parameters.items()}
-        settings = (f"{name}={value!r}" for name, value in self._values().items() if not _same(value, default[name]))
+        plain, defaults = json.loads(self._json()), self._described()["defaults"]
+        own = {name: value for name, value in self._values().items() if value is not None or not self._stands_for(name)}
+        differ = (name for name in own if name in plain and (name not in defaults or plain[name] != defaults[name]))
+        settings = (f"{name}={own[name]!r}" for name in differ)
         return f"{type(self).__name__}({', '.join(settings)})"
 
 
@@ -196,17 +198,3 @@ class Value(Parameters):
         return bool(json.loads(self._json()) == json.loads(other._json()))
 
     __hash__ = None  # type: ignore[assignment]
-
-
-def _same(value: object, default: object) -> bool:
-    """Return whether a parameter has its default; a list or an array equals a tuple of the same values."""
-    if value is default:
-        return True
-    if isinstance(default, tuple):
-        try:
-            return bool(tuple(value) == default)  # type: ignore[arg-type]
-        except (TypeError, ValueError):
-            return False
-    return (
-        isinstance(value, bool | int | float | str) and type(value) in (type(default), int, float) and value == default
-    )

@@ -11,7 +11,6 @@ from taxel._base.arguments import finite, integer, shown, text
 from taxel._base.columns import frozen, frozen_whole
 from taxel._base.errors import refused
 from taxel._base.limits import check_memory
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -60,7 +59,7 @@ class Reduction:
         if self.count_ms is not None:
             window_us = to_us(finite("count_ms", self.count_ms, least=0.001, most=_LONGEST_MS))
             if round(window_us, 6) % 1:
-                raise ProblemError(f"count_ms is {shown(self.count_ms)}: must be a whole number of us")
+                raise refused("count_ms", f" is {shown(self.count_ms)}: must be a whole number of us")
         if self.polarity is not None:
             text("polarity", self.polarity, POLARITIES)
 
