@@ -8,8 +8,9 @@ from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from taxel._base.errors import placed
-from taxel.array import Places
 from taxel.formats.layout import Data, Layout, Table, advice
 from taxel.formats.roles import Changes, OpenRolesError, Question, Role, lines_of
 
@@ -43,13 +44,7 @@ def of_layout(layout: Layout) -> str:
 
 def _lines(values: Any, is_stated: frozenset[str]) -> list[str]:
     """Return the lines of a table of TOML."""
-    if isinstance(values, Places):
-        columns = {"x": values.x, "y": values.y, "area": values.area}
-        lines = [
-            f"{key} = {_written(column.ravel().tolist())}" for key, column in columns.items() if column is not None
-        ]
-        return lines + ([] if values.unit is None else [f"unit = {_written(values.unit)}"])
-    every = ((key.name, getattr(values, key.name), key.default) for key in fields(values))
+    every = ((key.name, _plain(getattr(values, key.name)), key.default) for key in fields(values))
     return [
         f"{name} = {_written(value)}"
         for name, value, default in every
@@ -112,6 +107,11 @@ def _with(layout: Layout, values: Mapping[str, Any], stated: frozenset[str]) -> 
             inner[name] = replace(there, **{key: values[key] for key in keys})
     own = {key.name for key in fields(Layout)} & values.keys() - {"columns"}
     return replace(layout, **{key: values[key] for key in own}, **inner, stated=stated)
+
+
+def _plain(value: object) -> object:
+    """Return a value as it is, but numbers of an array as a list."""
+    return value.ravel().tolist() if isinstance(value, np.ndarray) else value
 
 
 def _written(value: object) -> str:

@@ -140,6 +140,7 @@ def _draft(text: Text, layout: Layout, lines: Sequence[str]) -> Draft:
     stated = layout.table or Table()
     size = (layout.rows or 0) * (layout.columns or 0)
     found, may_be_hex = fits_in(lines, text.lines, stated=layout)
+    found = [fit for fit in found if text.typed is None or fit.separator == "\t"]
     is_stated = not layout.stated.isdisjoint(("separator", "lines", "skip_lines"))
     fits = [fit for fit in found if is_stated or fit.purity >= FITS]
     fits.sort(key=lambda fit: (-fit.score, bool(size) and fit.count != size))

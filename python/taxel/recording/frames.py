@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import number
-from taxel._base.errors import refused
+from taxel._base.arguments import finite
 from taxel._base.limits import TIME_US
 from taxel._core import ProblemError
 from taxel.frames import Frames
@@ -22,14 +21,9 @@ def period_us(name: str, rate_hz: float) -> int:
 
     Raises
     ------
-    ProblemError : not above 0, or above 1 MHz
+    ProblemError : not from 1e-9 Hz, a frame in 31 years, to 1 MHz
     """
-    rate = number(name, rate_hz)
-    if not 0 < rate <= 1e6:
-        raise refused(name, f" is {rate}: must be above 0, at most 1000000")
-    if rate < 1e-9:
-        raise refused(name, f" is {rate}: must be 1e-9 (a frame in 31 years) or more")
-    return round(1e6 / rate)
+    return round(1e6 / finite(name, rate_hz, least=1e-9, most=1e6))
 
 
 def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:

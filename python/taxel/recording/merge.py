@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number, several, shown
-from taxel._base.errors import refused
+from taxel._base.arguments import finite, instance, several
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.events import Events
@@ -58,9 +57,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None) -> Re
     (True, [0, 200], ())
     """
     parts = [instance("recordings", part, Recording)._only for part in several("recordings", recordings)]
-    gap = None if gap_us is None else number("gap_us", gap_us)
-    if gap is not None and not 0 <= gap < 2**52:
-        raise refused("gap_us", f" is {shown(gap_us)}: must be 0 or more")
+    gap = None if gap_us is None else finite("gap_us", gap_us, least=0.0, most=2.0**52)
     if not parts:
         raise ProblemError("recordings: there must be one or more")
     _check(parts)
@@ -101,7 +98,7 @@ def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
 
 def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
     """Return recordings of one sensor as one source in memory."""
-    later = [_later(shift) for shift in shifts]
+    later: list[Times] = [partial(np.add, shift) for shift in shifts]
     tables = [part.table if not k else part.table._moved(t) for part, k, t in zip(parts, shifts, later, strict=True)]
     events = [table for table in tables if isinstance(table, Events)]
     table: Events | Frames = (
@@ -186,15 +183,6 @@ def _zeroings(tables: Sequence[Events | Frames], marks: Sequence[Marks]) -> tupl
         if {z for z in together if z.t < stop} != {z for z in each.zeroings if z.t < stop}:
             return None
     return together
-
-
-def _later(shift: int) -> Times:
-    """Return a function that makes times later, us."""
-
-    def times(t: NDArray[np.int64]) -> NDArray[np.int64]:
-        return t + shift
-
-    return times
 
 
 def agreed(values: Sequence[T], otherwise: T) -> T:

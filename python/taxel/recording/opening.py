@@ -208,13 +208,6 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     return [_of_camera(each, path, options.reduction, layout) for each in opened]
 
 
-def _no_camera(path: Path) -> ProblemError:
-    return ProblemError(
-        f"{path}: region, bin, count_ms and polarity are only for events without intensities, for example of an event "
-        "camera; this file has no such events"
-    )
-
-
 def _of_camera(recording: Recording, path: Path, given: Reduction, layout: Layout | None) -> Recording:
     """Return a recording with what is asked for of its events, if they are without intensities.
 
@@ -229,7 +222,8 @@ def _of_camera(recording: Recording, path: Path, given: Reduction, layout: Layou
     table = source.table if source.facts.has_events and not recording.is_several else None
     if not isinstance(table, Events) or (table.present is not None and table.present.any()):
         if given.is_given:
-            raise _no_camera(path)
+            right = "are only for events without intensities, for example of an event camera"
+            raise ProblemError(f"{path}: region, bin, count_ms and polarity {right}; this file has no such events")
         return recording
     return Recording({source.facts.label: SourceView(source.in_memory(reduced(str(path), table, reduction)))})
 

@@ -545,19 +545,15 @@ class Recording:
         chosen = self._sources
         if len(chosen) > 1 and not share_clock(chosen):
             # The interval is by the clock of the only sensor.
-            label = self._apart().facts.label
+            if self.is_several:
+                raise ProblemError(
+                    f"{self.path}: the sources ({', '.join(chosen)}) have different clocks, so one interval does not "
+                    "fit all; call on_clock(name) before between"
+                )
+            label = self._main.facts.label
             others = tuple(f"the source {name} (it has another clock)" for name in chosen if name != label)
             chosen = {label: self._main.stated(lost=(*self._main.facts.lost, *others))}
         return Recording({name: source.between(start, stop) for name, source in chosen.items()})
-
-    def _apart(self) -> SourceView:
-        """Return the only sensor beside streams of numbers; refuse several, which have different clocks."""
-        if self.is_several:
-            raise ProblemError(
-                f"{self.path}: the sources ({', '.join(self._sources)}) have different clocks, so one interval does "
-                "not fit all; call on_clock(name) before between"
-            )
-        return self._main
 
     def _why_empty(self) -> str:
         """Return where the events or frames of a recording are of which an empty slice was taken."""

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from taxel._base.arrays import hdf5, read_arrays, shapes
 from taxel._base.columns import frozen_whole
-from taxel._base.errors import refused
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -24,6 +23,7 @@ from taxel.events import Events
 from taxel.formats.checks import around
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
+from taxel.recording.stated import check_size
 
 #: The columns of events.
 EVENTS: tuple[str, ...] = ("t", "x", "y", "p")
@@ -126,8 +126,7 @@ def from_columns(path: Path, kind: str, columns: Mapping[str, NDArray[Any]], arr
     values = columns.get("values")
     if array is not None and values is not None and values.ndim == 3 and values.shape[1:] != array.shape:
         if values.shape[1:] != (1, array.rows * array.columns):
-            shape = " x ".join(map(str, values.shape[1:]))
-            raise refused("array", f" has {array.rows} x {array.columns} taxels; the frames of {path} have {shape}")
+            check_size(path, values.shape[1:], array)
         values = values.reshape(-1, *array.shape)
     try:
         if values is not None:

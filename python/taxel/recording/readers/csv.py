@@ -22,7 +22,7 @@ from taxel._base.errors import unreadable
 from taxel._base.header_table import separator_of
 from taxel._base.limits import COLUMNS, TAXELS
 from taxel._base.messages import counted
-from taxel._base.table_text import Text, beginning
+from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -38,7 +38,6 @@ from taxel.reading import Facts, InMemory
 EVENTS = ("t_us", "x", "y", "p")
 MORE = ("intensity", "repaired")
 _TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
-_OURS = re.compile(r" *t_us *[,;\t] *(?:x *[,;\t] *y *[,;\t] *p *(?:[,;\t\r\n]|$)|x\d{1,5}y\d{1,5} *(?:[,;\t\r\n]|$))")
 
 
 def read_csv(path: Path, array: Array | None = None) -> InMemory:
@@ -51,7 +50,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     FormatError : another header, or an invalid value (names line and column)
     """
     text = Text(path)
-    names, separator = _head(path, text)
+    names, separator = head_of(text)
     is_comma = separator != "," and any("," in line for line in text.head[1:])
     how = Table(separator=separator, decimal="," if is_comma else ".", time_column=1, time_unit="us")
     how = replace(how, events=tuple(names[:4]) == EVENTS)
@@ -71,32 +70,34 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     return InMemory(Facts(path=path, array=table.array, kind="csv", lost=tuple(lost)), table)
 
 
-def check_head(path: Path) -> None:
-    """Refuse a table whose first line is none of a recording.
-
-    Raises
-    ------
-    FormatError : another header
-    """
-    _head(path, Text(path))
-
-
 def names_in(line: str) -> tuple[list[str], str]:
     """Return the cells of a first line, without blanks around them, and what separates them."""
     separator = separator_of(line)
     return [name.strip() for name in line.split(separator)], separator
 
 
+def first_line_of(path: Path) -> str | None:
+    """Return the first line of a text, "" of an empty one; None of what is no text, as its reader then says."""
+    try:
+        return next(iter(Text(path).lines()), "")
+    except FormatError:
+        return None
+
+
 def is_of_taxel(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do: t_us,x,y,p or t_us,x0y0."""
-    head = beginning(path, 64)
-    is_utf_16 = head.startswith((b"\xff\xfe", b"\xfe\xff"))
-    text = head[: len(head) // 2 * 2].decode("utf-16", "ignore") if is_utf_16 else head.decode("utf-8-sig", "ignore")
-    return _OURS.match(text) is not None
+    names, _ = names_in(first_line_of(path) or "")
+    return tuple(names[:4]) == EVENTS or (names[0] == EVENTS[0] and any(map(_TAXEL.fullmatch, names[1:2])))
 
 
-def _head(path: Path, text: Text) -> tuple[list[str], str]:
-    """Return the names of the columns in the first line, and what separates the cells."""
+def head_of(text: Text) -> tuple[list[str], str]:
+    """Return the names of the columns in the first line, and what separates the cells.
+
+    Raises
+    ------
+    FormatError : none of a recording
+    """
+    path = text.path
     names, separator = names_in(next(iter(text.head), ""))
     if len(names) > COLUMNS:
         raise unreadable(f"{len(names)} columns; must have at most {COLUMNS}", path, line=1)

@@ -108,8 +108,8 @@ class McapReader(Reader):
     def _read_frames(self) -> _core._RecordedFrames:
         return self._now().frames()
 
-    @cached_property
-    def _table(self) -> Events | Frames:
+    def table(self) -> Events | Frames:
+        """Return the events or the frames."""
         array = self.facts.array
         if self._frames is None:
             return Events._unchecked(**self._decoded.events, array=array)
@@ -120,12 +120,8 @@ class McapReader(Reader):
         except ProblemError as error:
             raise FormatError(f"{self.facts.path}, source {self.facts.label}: {error}") from None
 
-    def table(self) -> Events | Frames:
-        """Return the events or the frames."""
-        return self._table
-
-    @cached_property
-    def _marks(self) -> Marks:
+    def marks(self) -> Marks:
+        """Return what happened at a time."""
         remarks = self._remarks
         settings = tuple((at, Registers._of_file(values, self._driven())) for at, values in remarks.registers)
         first = self._header.get("registers")
@@ -143,10 +139,6 @@ class McapReader(Reader):
             held=self._held(remarks.held),
         )
 
-    def marks(self) -> Marks:
-        """Return what happened at a time."""
-        return self._marks
-
     def _driven(self) -> Array:
         """Return the array that the registers drive."""
         geometry = self._header.get("driven")
@@ -159,8 +151,8 @@ class McapReader(Reader):
         ticks = np.array(held, np.float32).reshape(array.shape)
         return np.where(ticks == _core.UNKNOWN, np.float32(np.nan), ticks)
 
-    @cached_property
-    def _clock(self) -> Clock | None:
+    def clock(self) -> Clock | None:
+        """Return arrival times against the source's time."""
         if self._frames is not None:
             read = self._read_frames if self._frames.get("arrivals") else None
             return None if read is None else Clock(read["t"], read["at_ns"])
@@ -168,21 +160,13 @@ class McapReader(Reader):
         left, arrived = self._decoded.left[has], self._decoded.arrived_ns[has]
         return Clock(np.ascontiguousarray(left), np.ascontiguousarray(arrived))
 
-    def clock(self) -> Clock | None:
-        """Return arrival times against the source's time."""
-        return self._clock
-
-    @cached_property
-    def _verdict(self) -> Verdict:
+    def verdict(self) -> Verdict:
+        """Return what was lost at which stage; a board is decoded only if the file does not say it."""
         condition = self._remarks.condition
         # The counts of frames say all.
         if self._frames is None and condition["messages"] and self._must_decode():
             condition = condition | {"decoded": self._decoded.found}
         return Verdict._of({"file": condition})
-
-    def verdict(self) -> Verdict:
-        """Return what was lost at which stage; a board is decoded only if the file does not say it."""
-        return self._verdict
 
     def _must_decode(self) -> bool:
         """Return whether the counts in the file do not tell what decoding finds: damage at the end, wrong times."""
@@ -225,7 +209,7 @@ class McapReader(Reader):
         of_2 = decoded.version_2
         # Datagrams that this computer dropped or the file lost are missing among the board's numbers too, and are
         # counted separately.
-        lost_in_file = self._verdict.lost.get("lost_in_file", 0)
+        lost_in_file = self.verdict().lost.get("lost_in_file", 0)
         of_2["missing"] -= min(of_2["missing"], lost_in_file + (counts.get("dropped_by_queue") or 0))
         return {
             "datagrams": remarks.datagrams,
