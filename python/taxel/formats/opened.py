@@ -68,12 +68,12 @@ def readers_of(
         roles=tuple(map(asdict, roles)),
     )
 
-    def named(name: str) -> Facts:
+    readers = list[InMemory]()
+    for name, table in sources.items():
         side = name if name in ("left", "right") else ""
-        return replace(facts, label=source_of(name) if name else facts.label, side=side)
-
-    noted = notes or {}
-    return [InMemory(named(name), table, Marks(notes=tuple(noted.get(name, ())))) for name, table in sources.items()]
+        of_source = replace(facts, label=source_of(name) if name else facts.label, side=side)
+        readers.append(InMemory(of_source, table, Marks(notes=tuple((notes or {}).get(name, ())))))
+    return readers
 
 
 def _size_of(sources: Mapping[str, Frames | Events]) -> str:

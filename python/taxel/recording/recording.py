@@ -417,11 +417,6 @@ class Recording:
         """Whether it is a stream of numbers, such as that of an IMU, instead of an array of taxels."""
         return not self.is_several and bool(self._main.facts.columns)
 
-    @property
-    def is_on_clock(self) -> bool:
-        """Whether times were converted to another clock by `on_clock`."""
-        return self._main.view.clock is not None
-
     def datagrams(self) -> Datagrams:
         """Return the raw datagrams as received.
 
