@@ -211,7 +211,7 @@ def test_opening_cutting_and_listing_read_no_datagram(tmp_path: Path, monkeypatc
     def refuse(*_: object) -> None:
         raise AssertionError("a datagram is read")
 
-    monkeypatch.setattr("taxel.recording.readers.mcap.McapReader._decoded", property(refuse))
+    monkeypatch.setattr("taxel.recording.files.mcap.McapReader._decoded", property(refuse))
     recording = taxel.open(tmp_path / "a.mcap")
     listed = recording.notes, recording.registers, recording.zeroings, recording.detections, recording.verdict
     assert "here" in [note.text for note in listed[0]]

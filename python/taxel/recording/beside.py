@@ -12,7 +12,7 @@ from taxel._base.files import named
 from taxel._base.times import SINCE_1970_US
 from taxel._event_table import are_of_events, is_of_track
 from taxel.labels import Labels, Note, ahead_us, beside, trial_of
-from taxel.recording.readers.csv import first_line_of, names_in
+from taxel.recording.files.csv import first_line_of, names_in
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView, share_clock
 

@@ -15,14 +15,14 @@ from taxel.events import Events
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.reading import ENDINGS, Facts, InMemory
+from taxel.recording.files.columns import write_h5, write_npz
+from taxel.recording.files.csv import array_in_csv, write_csv
+from taxel.recording.files.lsa import write_lsa
+from taxel.recording.files.mcap import write_mcap
 from taxel.recording.frames import period_us
 from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView, share_clock
-from taxel.recording.writers.columns import write_h5, write_npz
-from taxel.recording.writers.csv import array_in_csv, write_csv
-from taxel.recording.writers.lsa import write_lsa
-from taxel.recording.writers.mcap import write_mcap
 
 __all__ = ["convert"]
 

@@ -30,10 +30,10 @@ from taxel.formats.table import read_table
 from taxel.formats.table_form import form_of
 from taxel.reading import ENDINGS, InMemory, Reader
 from taxel.recording.beside import LABELS, is_label_table
-from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
-from taxel.recording.readers.csv import head_of, is_of_taxel, read_csv
-from taxel.recording.readers.lsa import read_lsa
-from taxel.recording.readers.mcap import read_mcap
+from taxel.recording.files.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
+from taxel.recording.files.csv import head_of, is_of_taxel, read_csv
+from taxel.recording.files.lsa import read_lsa
+from taxel.recording.files.mcap import read_mcap
 from taxel.recording.stated import check_size
 
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.

@@ -91,7 +91,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     Parts of a .mcap are read when they are first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column for each taxel. The layout of
-    a .h5 is described in `taxel.recording.writers.columns`. The reference events of a ``labels.csv`` in a folder
+    a .h5 is described in `taxel.recording.files.columns`. The reference events of a ``labels.csv`` in a folder
     (`taxel.Labels`) become notes of the files of frames that the table names, and so do those of tables beside a
     recording: ``NAME_labels.csv``, ``NAME_events.csv``, ``NAME_events.tsv``, and a label track ``NAME.txt``.
 
