@@ -15,8 +15,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.column_names import AXES
-from taxel.formats.layout import Layout
-from taxel.formats.layout_text import of_layout
+from taxel.formats.layout import Layout, of_layout
 from taxel.formats.roles import Role
 from taxel.frames import Frames
 from taxel.labels import Note, source_of

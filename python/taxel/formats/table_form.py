@@ -20,10 +20,9 @@ from taxel._core import FormatError, ProblemError
 from taxel.formats import column_names
 from taxel.formats.form import Form, places_of
 from taxel.formats.layout import Layout, Table
-from taxel.formats.layout_text import refuse_open
 from taxel.formats.line_fits import FITS, THOUSAND, Fit, fits_in
 from taxel.formats.lines import OTHER, is_number, number_of, read_line
-from taxel.formats.roles import OF_AXES, SURE, Changes
+from taxel.formats.roles import OF_AXES, SURE, Changes, refuse_open
 from taxel.formats.table_columns import (
     Draft,
     are_events,

@@ -1,4 +1,4 @@
-"""The live format: a reader of each source, which reads part by part, and what writes datagrams, frames and the rest."""
+"""The live format: a reader of each source, which reads part by part; what writes datagrams, frames and the rest."""
 
 from __future__ import annotations
 
