@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +20,6 @@ from taxel.reading import Facts, InMemory, Marks, Times, Zeroing
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView
 from taxel.verdict import Verdict
-
-T = TypeVar("T")
 
 
 def merge(recordings: Iterable[Recording], *, gap_us: float | None = None) -> Recording:
@@ -115,6 +113,9 @@ def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
         found += each.detections
     facts = [part.facts for part in parts]
     names = ", ".join(each.name for each in facts)
+    # What they do not all state alike is not stated.
+    stated = {key: {getattr(each, key) for each in facts} for key in ("side", "heel", "columns", "turned", "frame_us")}
+    agreed: dict[str, Any] = {key: values.pop() for key, values in stated.items() if len(values) == 1}
     lost = dict.fromkeys(line for part in parts for line in part.lost)
     for part in parts:
         if part.array != table.array and (part.array._is_measured or part.array.names is not None):
@@ -128,15 +129,11 @@ def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
             array=table.array,
             kind="merged",
             source=f"merged of {names}",
-            side=agreed([each.side for each in facts], ""),
-            heel=agreed([each.heel for each in facts], ""),
             timed=any(each.timed for each in facts),
-            columns=agreed([each.columns for each in facts], ()),
-            turned=agreed([each.turned for each in facts], None),
-            frame_us=agreed([each.frame_us for each in facts], None),
             remarks=tuple(dict.fromkeys(line for each in facts for line in each.remarks)),
             lost=tuple(lost),
             truncated=any(each.truncated for each in facts),
+            **agreed,
         ),
         table,
         Marks(
@@ -183,8 +180,3 @@ def _zeroings(tables: Sequence[Events | Frames], marks: Sequence[Marks]) -> tupl
         if {z for z in together if z.t < stop} != {z for z in each.zeroings if z.t < stop}:
             return None
     return together
-
-
-def agreed(values: Sequence[T], otherwise: T) -> T:
-    """Return the value that all have; another where they differ."""
-    return values[0] if all(value == values[0] for value in values) else otherwise

@@ -32,7 +32,7 @@ STAMP_US = 100
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LsaReader(InMemory):
-    """A .lsa, whose bytes are kept: `datagrams` cuts them at stamps, each of which is its arrival time."""
+    """A .lsa, whose bytes are kept."""
 
     payload: NDArray[np.uint8]
     differences: bool
@@ -42,8 +42,11 @@ class LsaReader(InMemory):
         object.__setattr__(self, "facts", replace(self.facts, raw="datagrams"))
 
     def datagrams(self) -> Datagrams:
-        """Return the bytes as datagrams."""
-        return cut_raw(self.payload, differences=self.differences)
+        """Return the bytes as datagrams, cut at stamps; the arrival time of each is the board's of its first stamp."""
+        payload = np.ascontiguousarray(self.payload)
+        offsets, times = _core.wire_cut(payload)
+        numbers = np.arange(len(times), dtype=np.uint64)
+        return Datagrams(times * 1000, numbers, offsets, payload, differences=self.differences)
 
 
 def read_lsa(path: Path, array: Array | None = None, *, differences: bool = False) -> LsaReader:
@@ -89,14 +92,6 @@ def read_lsa(path: Path, array: Array | None = None, *, differences: bool = Fals
     verdict = Verdict._of({"raw": [None if complete else marker.name, damage]})
     counts = {"bytes": len(payload), "decoder": decoded}
     return LsaReader(facts, events, lost=verdict, counted=counts, payload=payload, differences=differences)
-
-
-def cut_raw(raw: NDArray[np.uint8], *, differences: bool = False) -> Datagrams:
-    """Split raw bytes into datagrams; the arrival time of each is the board's time of its first stamp."""
-    raw = np.ascontiguousarray(raw)
-    offsets, times = _core.wire_cut(raw)
-    numbers = np.arange(len(times), dtype=np.uint64)
-    return Datagrams(times * 1000, numbers, offsets, raw, differences=differences)
 
 
 def write_lsa(path: Path, source: SourceView, *, overwrite: bool) -> list[str]:
