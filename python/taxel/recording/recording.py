@@ -23,8 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.reading import BoardChange, Datagrams, Reader, Zeroing, kind_of_file
-from taxel.recording.frames import FRAMES_HZ, period_us
-from taxel.recording.gaps import Gaps, gaps_of, with_gaps
+from taxel.recording.frames import FRAMES_HZ, Gaps, gaps_of, period_us, with_gaps
 from taxel.recording.source import SourceView, one_clock, share_clock
 from taxel.tare import Tare
 from taxel.verdict import Verdict

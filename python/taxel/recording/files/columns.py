@@ -22,7 +22,7 @@ from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.checks import around
+from taxel.formats.table import around
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 from taxel.recording.stated import check_size

@@ -27,11 +27,10 @@ from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.checks import around
 from taxel.formats.form import Form
 from taxel.formats.layout import Table
 from taxel.formats.lines import odd_lines
-from taxel.formats.table import Rows, events_of, read_rows
+from taxel.formats.table import Rows, around, events_of, read_rows
 from taxel.formats.times import in_order
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory

@@ -31,6 +31,17 @@ __all__ = ["DOUBTS", "STEPS", "McapReader", "RecordingWriter", "encode_events", 
 
 #: The damage after which times are doubtful; from when on is known by the file's own times alone.
 DOUBTS = ("jumps_of_time", "stamps_out_of_order", "drifts_from_arrival")
+#: What a stream of numbers counts, whether it happened or not.
+_OF_STREAMS = (
+    "bytes_in_no_line",
+    "bytes_of_unfinished_lines",
+    "clock_began_anew",
+    "drifts_from_arrival",
+    "jumps_of_time",
+    "lines_that_could_not_be_read",
+    "missing_values",
+    "stamps_out_of_order",
+)
 #: What is counted where times step back, by how much and where.
 STEPS = ("events_out_of_order", "events_overtaken")
 #: Number of values of a block of frames: a chunk of the file.
@@ -223,10 +234,11 @@ class McapReader(Reader):
     def _counts_of_frames(self) -> dict[str, Any]:
         read = self._read_frames
         recorded = (self._counted or self._remarks.counts or {}).get("decoder", {})
+        of_lines = _OF_STREAMS if self.facts.columns else ()
         return {
             "frames": len(read["t"]),
             "frames_that_could_not_be_read": read["bad"],
-            **(recorded if self.facts.columns else {}),
+            **{cause: recorded.get(cause, 0) for cause in of_lines},
             "received": self._counted.get("received"),
         }
 
