@@ -381,20 +381,25 @@ def _one_line_a_time(
     path: Path, form: Form, rows: Rows, values: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], list[str]]:
     """Return the readings of one time in one line, and the names of the taxels, which lines of the table state."""
+    import pandas as pd  # noqa: PLC0415  takes long
+
     if values.shape[1:] != (1, 1) or rows.times is None:
         right = "a table with taxel_column must have a time_column and one column of readings"
         raise unreadable(f"{right}; its readings are {', '.join(map(form.called, form.taxels))}", path)
-    twice = rows.beside[rows.beside.duplicated(["time", "taxel"])]
-    if len(twice):
-        raise unreadable(f"{twice['taxel'].iloc[0]} has two readings at the time {twice['time'].iloc[0]}", path)
-    names = list(rows.beside["taxel"].unique())
+    frame, times = pd.factorize(rows.times)
+    taxel, names = pd.factorize(rows.beside["taxel"], sort=False)
     if len(form.columns.taxel) > 1:
         # Row by row, in whatever order the lines are.
-        names.sort(key=lambda name: [*map(float, name.split())])
-    readings = rows.beside.assign(reading=values[:, 0, 0]).pivot(index="time", columns="taxel", values="reading")
-    wide = readings.reindex(rows.times.unique())[names].to_numpy(np.float32)
-    rows.chosen(np.flatnonzero(~rows.times.duplicated()))
-    return wide[:, None], names
+        order = sorted(range(len(names)), key=lambda k: [*map(float, names[k].split())])
+        taxel, names = np.argsort(order)[taxel], names[order]
+    twice = np.flatnonzero(pd.Series(frame * len(names) + taxel).duplicated())
+    if len(twice):
+        at = rows.beside.iloc[twice[0]]
+        raise unreadable(f"{at['taxel']} has two readings at the time {at['time']}", path)
+    wide = np.full((len(times), 1, len(names)), np.nan, np.float32)
+    wide[frame, 0, taxel] = values[:, 0, 0]
+    rows.chosen(np.flatnonzero(~pd.Series(frame).duplicated()))
+    return wide, list(names)
 
 
 def _by_axis(
