@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel.recording.writers.mcap import RecordingWriter
+from taxel.recording.files.mcap import RecordingWriter
 from taxel_benchmarks._goals import Goal, at_most
 from taxel_benchmarks._opening import STEPS
 from taxel_benchmarks._rounds import compared, summary

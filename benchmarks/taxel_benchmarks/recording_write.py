@@ -19,7 +19,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from taxel.recording.writers.mcap import RecordingWriter
+from taxel.recording.files.mcap import RecordingWriter
 from taxel_benchmarks._goals import Goal, not_slower
 from taxel_benchmarks._rounds import measured, missing
 

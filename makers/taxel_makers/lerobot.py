@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from taxel import Frames
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.layout import Data, Layout
-from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
-from taxel.formats.roles import FIRST, LIKELY, OF_AXES, OPEN, SURE, Changes, Question, Role
+from taxel.formats.roles import FIRST, LIKELY, OF_AXES, OPEN, SURE, Changes, Question, Role, refuse_open
 from taxel.formats.times import in_order
 from taxel.labels import Note, source_of
 from taxel.reading import InMemory, damaged, read_parquet, refused, unreadable, values_in, warn

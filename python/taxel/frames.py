@@ -149,7 +149,7 @@ class Frames(FrozenColumns):
 
     @cached_property
     def _found(self) -> dict[str, Any]:
-        """Results of costly functions of these values, which never change (`taxel.recording.analysis.quiet`)."""
+        """Results of costly functions of these values, which never change (`taxel.recording.analysis.rest`)."""
         return {}
 
     def __len__(self) -> int:

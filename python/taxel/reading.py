@@ -437,7 +437,7 @@ class InMemory(Reader):
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Say what of a source is looked at: a time, a rectangle, another clock, the rate of numbered frames.
+    """Say what of a source is looked at: a time, a rectangle, another clock.
 
     Parameters
     ----------
@@ -448,9 +448,7 @@ class View:
     clock : str, optional
         The name of the clock of all times; default: the source's own.
     times : function, optional
-        Converts the source's times to those of `clock`; default: they are the same.
-    rate_hz : float, Hz, optional
-        Frames a second of numbered frames.
+        Converts the source's times to those of `clock`, or the numbers of frames to times; default: they are the same.
     notes : tuple of Note
         Notes that are not in the file, by the view's clock.
     """
@@ -461,7 +459,6 @@ class View:
     rows: slice | None = None
     clock: str | None = None
     times: Times | None = None
-    rate_hz: float | None = None
     notes: tuple[Note, ...] = ()
 
     @property
@@ -472,4 +469,4 @@ class View:
     @property
     def is_whole(self) -> bool:
         """Whether it is of all of the source, by its own clock."""
-        return not self.is_slice and self.columns is None and self.times is None and self.rate_hz is None
+        return not self.is_slice and self.columns is None and self.times is None

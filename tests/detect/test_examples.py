@@ -13,7 +13,7 @@ from taxel import Detections, Tare
 from taxel._base.messages import collected
 from taxel.detect import Example, score
 from taxel.detect.examples import array_of, unreliable
-from taxel.recording.analysis.quiet import touched
+from taxel.recording.analysis.rest import touched
 
 
 @given(st.integers(0, 1000), st.floats(0, 0.9))

@@ -112,6 +112,18 @@ def _workbook(path: Path) -> Path:
     return path
 
 
+def _times_of_day(path: Path) -> Path:
+    times = pd.to_datetime(np.arange(60), unit="s").time
+    pd.DataFrame({"when": times, "a": READINGS[:60, 0], "b": READINGS[:60, 1]}).to_excel(path, index=False)
+    return path
+
+
+def _spans_of_time(path: Path) -> Path:
+    spans = pd.to_timedelta(np.arange(60) * 20, unit="ms")
+    pd.DataFrame({"since": spans, "a": READINGS[:60, 0], "said": "so, so"}).to_parquet(path)
+    return path
+
+
 def _lists(path: Path) -> Path:
     table = pd.DataFrame({"timestamp": np.arange(9) / 30, "p": list(np.arange(10800.0).reshape(9, 1200))})
     table.to_parquet(path)
@@ -141,6 +153,8 @@ FILES: dict[str, Callable[[Path], Path]] = {
     "6 trials": lambda to: _arrays(to / "a.npz", X=np.zeros((20, 500, 16)), y=np.zeros(20)),
     "2 lists in cells": lambda to: _lists(to / "p.parquet"),
     "11 sheets": lambda to: _workbook(to / "a.xlsx"),
+    "times of day in a sheet": lambda to: _times_of_day(to / "a.xlsx"),
+    "spans of time in Parquet": lambda to: _spans_of_time(to / "p.parquet"),
     "an empty array": lambda to: _arrays(to / "a.npy", one=np.zeros((0, 3))),
 }
 

@@ -15,8 +15,7 @@ import pytest
 import taxel
 from taxel import FormatError, Frames
 from taxel._base.errors import Place
-from taxel.formats.layout import Layout
-from taxel.formats.layout_text import of_layout
+from taxel.formats.layout import Layout, of_layout
 from taxel.formats.table import read_table
 from taxel.reading import InMemory
 

@@ -17,8 +17,7 @@ import taxel
 from taxel import FormatError, Frames
 from taxel._base.errors import Place
 from taxel.formats.array_file import read_array_file
-from taxel.formats.layout import Layout
-from taxel.formats.layout_text import of_layout
+from taxel.formats.layout import Layout, of_layout
 
 from .tables import Opened, opened_by
 

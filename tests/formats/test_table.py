@@ -18,7 +18,7 @@ from refusal import refused
 import taxel
 from taxel import Array, Events, FormatError, Frames
 from taxel._base.errors import Place
-from taxel.formats.layout_text import of_layout
+from taxel.formats.layout import of_layout
 from taxel.formats.table import read_table
 
 from .tables import frames, layouts, opened, opened_by

@@ -21,7 +21,7 @@ from taxel.options import FullReading
 from taxel.panel import Panel
 from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.pressure import above_rest
-from taxel.recording.analysis.quiet import ticks_by_unit
+from taxel.recording.analysis.rest import ticks_by_unit
 
 
 def frames_of(fractions=True):

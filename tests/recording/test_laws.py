@@ -128,7 +128,7 @@ def test_any_steps_give_what_numpy_makes_of_the_whole(
             case "on_clock":
                 # A clock is measured by the stamps of datagrams: a converted recording of few events may have none.
                 is_measured = recording.clock is not None and len(recording.clock.board_us)
-                if recording.is_slice or recording.is_on_clock or not is_measured:
+                if recording.is_slice or recording._main.view.clock or not is_measured:
                     continue
                 host = recording.clock.host_ns(np.concatenate([model.t, np.array([t for _, t in model.notes])]))
                 times = (np.asarray(host, np.int64) + 500) // 1000
@@ -211,7 +211,7 @@ def test_opening_cutting_and_listing_read_no_datagram(tmp_path: Path, monkeypatc
     def refuse(*_: object) -> None:
         raise AssertionError("a datagram is read")
 
-    monkeypatch.setattr("taxel.recording.readers.mcap.McapReader._decoded", property(refuse))
+    monkeypatch.setattr("taxel.recording.files.mcap.McapReader._decoded", property(refuse))
     recording = taxel.open(tmp_path / "a.mcap")
     listed = recording.notes, recording.registers, recording.zeroings, recording.detections, recording.verdict
     assert "here" in [note.text for note in listed[0]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import h5py
@@ -70,20 +69,17 @@ def opened(table: taxel.Events | taxel.Frames, folder: Path, name: str = "a.npz"
     return taxel.open(folder / name)
 
 
-@pytest.mark.parametrize(
-    ("asked", "there"),
-    [
-        ({"columns": slice(3, 99)}, "columns 3 to 99: must be within 0 to 5, because there are 6 columns"),
-        ({"columns": slice(7, None)}, "columns 7 to the last: must be within 0 to 5"),
-        ({"rows": slice(None, 5)}, "rows 0 to 5: must be within 0 to 3, because there are 4 rows"),
-        ({"rows": slice(-9, 2)}, "rows -9 to 2: must be within 0 to 3"),
-    ],
-)
-def test_a_part_beyond_the_array_is_refused(tmp_path: Path, asked: dict[str, slice], there: str) -> None:
+def test_a_part_beyond_the_array_is_refused(tmp_path: Path) -> None:
     frames = taxel.Frames(np.zeros((2, 4, 6)), [0, 100])
     rec = opened(frames, tmp_path)
-    with pytest.raises(taxel.ProblemError, match=re.escape(there)):
-        taxel.cut(rec, **asked)
+    for columns, rows, said in [
+        (slice(3, 99), None, "columns 3 to 99"),
+        (slice(7, None), None, "columns 7 to the last"),
+        (None, slice(None, 5), "rows 0 to 5"),
+        (slice(2, 2), slice(-9, 2), "columns 2 to 2 and rows -9 to 2"),
+    ]:
+        with pytest.raises(taxel.ProblemError, match=rf"^{said}: must be within"):
+            taxel.cut(rec, columns=columns, rows=rows)
     assert taxel.cut(rec, columns=slice(3, 6), rows=slice(-2, None))[0].array.shape == (2, 3)
 
 

@@ -68,7 +68,7 @@ def test_a_recording_larger_than_the_memory_is_refused_with_both_sizes(
 ) -> None:
     path = tmp_path / "a.mcap"
     record(path, some_events(5000))
-    monkeypatch.setattr("taxel.recording.readers.mcap.available", lambda: 1000)
+    monkeypatch.setattr("taxel.recording.files.mcap.available", lambda: 1000)
     with pytest.raises(FormatError) as caught:
         len(taxel.open(path).events)
     assert caught.value.place == Place(str(path))

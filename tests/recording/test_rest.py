@@ -12,8 +12,7 @@ from shell import run
 import taxel
 from taxel import Array, Frames, Tare
 from taxel.recording.analysis.pressure import above_rest, series
-from taxel.recording.analysis.quiet import TOUCH, by_unit, standing, touched
-from taxel.recording.analysis.rest import of_frames
+from taxel.recording.analysis.rest import TOUCH, by_unit, of_frames, standing, touched
 
 
 def sent(frames: taxel.Frames) -> taxel.Events:

@@ -251,7 +251,13 @@ def _damaged(path: Path, error: Exception) -> Exception:
 
 
 def _columns_in(name: str, column: Any) -> Iterator[tuple[str, Any]]:
-    """Yield a column of a DataFrame, or a column for each place in its lists, if all have the same shape."""
+    """Yield a column of a DataFrame, or a column for each place in its lists, if all have the same shape.
+
+    Spans of time are numbers of seconds.
+    """
+    if column.dtype.kind == "m":
+        yield f"{name} [s]", column.dt.total_seconds()
+        return
     first = column.iloc[0] if len(column) else None
     if column.dtype != object or not isinstance(first, np.ndarray | list):
         yield name, column
@@ -287,8 +293,8 @@ def _cells(column: NDArray[Any]) -> NDArray[Any]:
 
 
 def _cell(value: Any) -> Any:
-    """Return the cell of a sheet as tables of text have it: dates with times as of ISO 8601."""
-    return value.isoformat(sep=" ") if hasattr(value, "isoformat") and hasattr(value, "hour") else value
+    """Return the cell of a sheet as tables of text have it: dates with times, and times of a day, as of ISO 8601."""
+    return str(value) if hasattr(value, "hour") else value
 
 
 def marked(path: Path, data: bytes) -> tuple[bytes, str]:

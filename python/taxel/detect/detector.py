@@ -19,7 +19,7 @@ from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import unit_of
-from taxel.recording.analysis.quiet import FORCE_UNITS, floor_at_rest
+from taxel.recording.analysis.rest import FORCE_UNITS, floor_at_rest
 from taxel.tare import Tare, check_absorb
 from taxel.wire import FRAME_US
 

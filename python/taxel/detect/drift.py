@@ -10,7 +10,7 @@ from taxel.detect.detector import _Detector
 from taxel.detect.examples import Example
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
-from taxel.recording.analysis.quiet import FORCE_UNITS
+from taxel.recording.analysis.rest import FORCE_UNITS
 
 #: After so long a load that stays is rest, s. It is stated and not learnt: five times the longest press of a training
 #: swallowed 33 of 349 presses and lifts of half a minute.

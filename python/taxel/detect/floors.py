@@ -10,7 +10,7 @@ from taxel.detect import recipes
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.analysis.quiet import BY_UNIT, NOISE_FLOOR, TIMES_NOISE, TOUCH, early, noise_floor, reach
+from taxel.recording.analysis.rest import BY_UNIT, NOISE_FLOOR, TIMES_NOISE, TOUCH, early, noise_floor, reach
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -28,7 +28,7 @@ _BEFORE_US, _LOOK_US, _LEAST_FRAMES = 20_000, 250_000, 8
 def measured_floor(examples: Sequence[Example]) -> float | None:
     """Return the noise floor of frames of a sensor, in its unit; None of a board's, whose registers set it.
 
-    The median of `taxel.recording.analysis.quiet.noise_floor` over the examples, as feet and recordings, to three
+    The median of `taxel.recording.analysis.rest.noise_floor` over the examples, as feet and recordings, to three
     digits: one whose noise is larger is no reason to ignore small loads in all others.
 
     Parameters

@@ -17,9 +17,8 @@ from taxel._base.errors import unreadable
 from taxel._base.messages import counted, warn
 from taxel.formats.column_names import AXES, time_unit
 from taxel.formats.layout import Data, Layout, advice
-from taxel.formats.layout_text import refuse_open
 from taxel.formats.opened import readers_of, sources_of
-from taxel.formats.roles import LIKELY, OF_AXES, OPEN, SURE, Changes, Question, Role, named, of_unit
+from taxel.formats.roles import LIKELY, OF_AXES, OPEN, SURE, Changes, Question, Role, named, of_unit, refuse_open
 from taxel.formats.times import in_order, unit_of_times
 from taxel.reading import InMemory
 

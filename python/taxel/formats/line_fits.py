@@ -175,8 +175,8 @@ def fits_of(
         marked = separator in (",", ";") if kind != "plain" else separator == " "
         if len(forms) > 1 and (
             (not marked and separator != "," and not any(separator in line for line in few))
-            or (separator == decimal and not _are_quoted_decimals(few))
-            or (kind == "marked" and (2 * sum(map(has_marks, few)) < len(few) or _are_quoted_numbers(few)))
+            or (separator == decimal and not _are_quoted(few, ",."))
+            or (kind == "marked" and (2 * sum(map(has_marks, few)) < len(few) or _are_quoted(few, ",.", ".,")))
             or (kind == "marked" and decimal == "." and _have_units_behind_decimals(few))
             or (kind == "json" and not any(line.lstrip()[:1] in "{[" for line in few))
         ):
@@ -192,21 +192,10 @@ def fits_of(
             yield fit
 
 
-def _with_comma(lines: Sequence[str]) -> list[str]:
-    """Return the quoted cells in which a comma is."""
-    return [cell for line in lines for cell in _QUOTED.findall(line) if "," in cell]
-
-
-def _are_quoted_numbers(lines: Sequence[str]) -> bool:
-    """Return whether all that is quoted is one number with a comma each, which a comma does not split."""
-    quoted = _with_comma(lines)
-    return bool(quoted) and all(is_number(cell, ",", ".") or is_number(cell, ".", ",") for cell in quoted)
-
-
-def _are_quoted_decimals(lines: Sequence[str]) -> bool:
-    """Return whether all of these have decimal commas."""
-    quoted = _with_comma(lines)
-    return bool(quoted) and all(is_number(cell, ",", ".") for cell in quoted)
+def _are_quoted(lines: Sequence[str], *marks: str) -> bool:
+    """Return whether all quoted cells with a comma are numbers by some marks of decimals and of thousands."""
+    quoted = [cell for line in lines for cell in _QUOTED.findall(line) if "," in cell]
+    return bool(quoted) and all(any(is_number(cell, *pair) for pair in marks) for cell in quoted)
 
 
 def _thousands(lines: Sequence[tuple[int, Line]], decimal: str) -> str | None:

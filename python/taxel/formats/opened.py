@@ -15,8 +15,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.column_names import AXES
-from taxel.formats.layout import Layout
-from taxel.formats.layout_text import of_layout
+from taxel.formats.layout import Layout, of_layout
 from taxel.formats.roles import Role
 from taxel.frames import Frames
 from taxel.labels import Note, source_of
@@ -68,12 +67,12 @@ def readers_of(
         roles=tuple(map(asdict, roles)),
     )
 
-    def named(name: str) -> Facts:
+    readers = list[InMemory]()
+    for name, table in sources.items():
         side = name if name in ("left", "right") else ""
-        return replace(facts, label=source_of(name) if name else facts.label, side=side)
-
-    noted = notes or {}
-    return [InMemory(named(name), table, Marks(notes=tuple(noted.get(name, ())))) for name, table in sources.items()]
+        of_source = replace(facts, label=source_of(name) if name else facts.label, side=side)
+        readers.append(InMemory(of_source, table, Marks(notes=tuple((notes or {}).get(name, ())))))
+    return readers
 
 
 def _size_of(sources: Mapping[str, Frames | Events]) -> str:

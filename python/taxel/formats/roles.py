@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import TYPE_CHECKING, Any, TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
+from taxel._base.errors import placed
 from taxel._core import FormatError
-
-if TYPE_CHECKING:
-    from taxel.formats.layout import Layout
+from taxel.formats.layout import Layout, advice, changed, of_layout, without
 
 #: How sure a role is: it cannot be anything else; it is assumed, and said; nothing is read before it is answered.
 SURE, LIKELY, OPEN = "sure", "likely", "open"
@@ -23,6 +23,7 @@ SURE, LIKELY, OPEN = "sure", "likely", "open"
 Changes: TypeAlias = Mapping[str, Any]
 #: So many first values of a column are shown.
 FIRST = 3
+_RATE_NOT_SAID = "# rate_hz = 100  # frames per second, which the file does not state"
 _MARKS = {SURE: " ", LIKELY: "~", OPEN: "?"}
 
 
@@ -104,6 +105,34 @@ class OpenRolesError(FormatError):
     layout: Layout
     roles: Sequence[Role]
     questions: Sequence[Question]
+
+
+def refuse_open(path: Path, about: str, layout: Layout, roles: Sequence[Role], questions: Sequence[Question]) -> None:
+    """Refuse a file of which something is open: with the table of its roles, and the layout by each first answer.
+
+    Each layout leaves out the keys of the questions that are still open then.
+
+    Raises
+    ------
+    OpenRolesError : there is a question (the table and the layouts are below its first line)
+    """
+    if not questions:
+        return
+    (why, keys, choices), *others = ((each.why, each.keys, each.choices) for each in questions)
+    also = "".join(f"; also open: {other}" for other, _, _ in others)
+    ways = f"{about} {len(choices)} ways ({why})" if len(choices) > 1 else why
+    later = frozenset[str]().union(*(keys for _, keys, _ in others)) - keys
+    lines = [f"# {line}" for line in lines_of(roles)]
+    for number, (name, changes) in enumerate(choices.items(), 1):
+        full = without(changed(layout, changes), later)
+        times = (getattr(full.table, "time_column", None), getattr(full.table, "frame_time", None))
+        found = any(role.role == "time" for role in roles) and full.data is not None
+        timed = found or any((*times, full.rate_hz, getattr(full.data, "time", None)))
+        lines += [f"# {number}. {name}", *([] if timed else [_RATE_NOT_SAID]), of_layout(full)]
+    right = advice(path, f"write {'one of these' if len(choices) > 1 else 'this'}")
+    error = placed(OpenRolesError(f"{ways}{also}; {right}:", "\n".join(lines).rstrip()), path)
+    error.layout, error.roles, error.questions = layout, roles, questions
+    raise error
 
 
 def lines_of(roles: Sequence[Role]) -> Iterator[str]:

@@ -22,7 +22,6 @@ from taxel._base.table_text import SHEETS, TEXTS, Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.checks import around
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout
@@ -495,3 +494,14 @@ def events_of(path: Path, form: Form, names: Sequence[str], rows: Rows, array: A
     if present is not None:
         more |= {"intensity": np.nan_to_num(by_name["intensity"]).astype(np.uint16), "present": present}
     return Events(us.astype(np.int64), x, y, by_name["p"] > 0, array=array or around(x, y), **more)
+
+
+def around(x: NDArray[Any], y: NDArray[Any]) -> Array:
+    """Return the thesis' array, or a larger array if events are outside it."""
+    thesis = Array.thesis()
+    if not len(x):
+        return thesis
+    if min(x.min(), y.min()) < 0 or max(x.max(), y.max()) >= 65_535:
+        raise ProblemError("x and y: must be from 0 to 65534")
+    rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
+    return thesis if (rows, columns) == thesis.shape else Array(rows, columns)

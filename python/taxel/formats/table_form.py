@@ -20,10 +20,9 @@ from taxel._core import FormatError, ProblemError
 from taxel.formats import column_names
 from taxel.formats.form import Form, places_of
 from taxel.formats.layout import Layout, Table
-from taxel.formats.layout_text import refuse_open
 from taxel.formats.line_fits import FITS, THOUSAND, Fit, fits_in
 from taxel.formats.lines import OTHER, is_number, number_of, read_line
-from taxel.formats.roles import OF_AXES, SURE, Changes
+from taxel.formats.roles import OF_AXES, SURE, Changes, refuse_open
 from taxel.formats.table_columns import (
     Draft,
     are_events,
@@ -140,6 +139,7 @@ def _draft(text: Text, layout: Layout, lines: Sequence[str]) -> Draft:
     stated = layout.table or Table()
     size = (layout.rows or 0) * (layout.columns or 0)
     found, may_be_hex = fits_in(lines, text.lines, stated=layout)
+    found = [fit for fit in found if text.typed is None or fit.separator == "\t"]
     is_stated = not layout.stated.isdisjoint(("separator", "lines", "skip_lines"))
     fits = [fit for fit in found if is_stated or fit.purity >= FITS]
     fits.sort(key=lambda fit: (-fit.score, bool(size) and fit.count != size))

@@ -331,12 +331,11 @@ def _ascending(times: Sequence[int]) -> list[int]:
 
 def _spread(t: NDArray[np.int64], usual: int) -> NDArray[np.int64]:
     """Return times in which those that repeat are spread evenly up to the next one."""
-    begins = np.flatnonzero(np.diff(t, prepend=t[0] - 1))
-    counts = np.diff(begins, append=len(t))
-    nexts = np.append(t[begins[1:]], t[-1] + round(usual * counts[-1] / float(np.median(counts))))
+    each, begins, counts = np.unique(t, return_index=True, return_counts=True)
+    last = each[-1] + round(usual * counts[-1] / float(np.median(counts)))
     within = np.arange(len(t)) - np.repeat(begins, counts)
     # A pause after a time that repeats is none between its lines.
-    own = (nexts - t[begins]) / counts
+    own = np.diff(each, append=last) / counts
     gaps = np.repeat(np.minimum(own, np.median(own)), counts)
     spread = t + np.floor(within * gaps).astype(np.int64)
     # Fewer us than lines between two times.

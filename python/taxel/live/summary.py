@@ -8,7 +8,7 @@ from typing import Any
 
 from taxel import _core
 from taxel.recording import open_one
-from taxel.recording.readers.mcap import DOUBTS, STEPS
+from taxel.recording.files.mcap import DOUBTS, STEPS
 from taxel.tare import Tare
 from taxel.verdict import Verdict
 

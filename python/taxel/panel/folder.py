@@ -14,8 +14,7 @@ from taxel import _core
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
-from taxel.formats.layout import Layout
-from taxel.formats.layout_text import of_layout
+from taxel.formats.layout import Layout, of_layout
 from taxel.formats.roles import Changes
 from taxel.live.lines import first_lines
 from taxel.panel.look import Looks, layout_beside, picture

@@ -21,8 +21,17 @@ from taxel._base.table_text import Text
 from taxel._core import Error, FormatError, ProblemError
 from taxel.formats.column_names import AXES
 from taxel.formats.form import Form
-from taxel.formats.layout import AXES_OF_ARRAYS, Data, Layout, PrintedFrames, Table, layout_name
-from taxel.formats.layout_text import changed, of_layout, without
+from taxel.formats.layout import (
+    AXES_OF_ARRAYS,
+    Data,
+    Layout,
+    PrintedFrames,
+    Table,
+    changed,
+    layout_name,
+    of_layout,
+    without,
+)
 from taxel.formats.line_fits import Fit
 from taxel.formats.parts import parts_of
 from taxel.formats.roles import OPEN, Changes, OpenRolesError, Question, Role

@@ -23,8 +23,7 @@ from taxel.options import FullReading
 from taxel.panel.regions import RegionLoads
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health, judge
-from taxel.recording.analysis.quiet import ticks_by_unit
-from taxel.recording.analysis.rest import loaded_from, of_frames
+from taxel.recording.analysis.rest import loaded_from, of_frames, ticks_by_unit
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.kinds import is_recording, layout_of, takes_layout

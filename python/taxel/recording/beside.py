@@ -9,12 +9,10 @@ from pathlib import Path
 
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named
-from taxel._base.table_text import Text
 from taxel._base.times import SINCE_1970_US
-from taxel._core import FormatError
 from taxel._event_table import are_of_events, is_of_track
 from taxel.labels import Labels, Note, ahead_us, beside, trial_of
-from taxel.recording.readers.csv import names_in
+from taxel.recording.files.csv import first_line_of, names_in
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView, share_clock
 
@@ -114,10 +112,7 @@ def _begin_of(sources: Mapping[str, SourceView], labels: Labels) -> Callable[[],
 
 def is_label_table(path: Path) -> bool:
     """Return whether a text is a table of labels (`taxel.Labels`): by its first lines, or empty by its name."""
-    try:
-        first = next(iter(Text(path).lines()), "")
-    except FormatError:
-        # The reader of tables reports what is no text.
+    if (first := first_line_of(path)) is None:
         return False
     (names, _), is_named = names_in(first), path.name.endswith(TABLES[:-1])
     if {"label", "t_us"} <= set(names) or is_of_track(first):

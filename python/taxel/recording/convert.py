@@ -15,19 +15,16 @@ from taxel.events import Events
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.reading import ENDINGS, Facts, InMemory
+from taxel.recording.files.columns import write_h5, write_npz
+from taxel.recording.files.csv import array_in_csv, write_csv
+from taxel.recording.files.lsa import write_lsa
+from taxel.recording.files.mcap import write_mcap
 from taxel.recording.frames import period_us
 from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView, share_clock
-from taxel.recording.writers.columns import write_h5, write_npz
-from taxel.recording.writers.csv import array_in_csv, write_csv
-from taxel.recording.writers.lsa import write_lsa
-from taxel.recording.writers.mcap import write_mcap
 
-__all__ = ["KINDS", "convert"]
-
-#: The kinds of files that can be written.
-KINDS = tuple(ENDINGS)
+__all__ = ["convert"]
 
 
 def convert(
@@ -78,8 +75,8 @@ def convert(
     """
     path = Path(checked_path("target", target))
     kind = path.suffix.lower()
-    if kind not in KINDS:
-        raise ProblemError(f"{path}: ends in {kind or 'nothing'!r}; must end in one of {', '.join(KINDS)}")
+    if kind not in ENDINGS:
+        raise ProblemError(f"{path}: ends in {kind or 'nothing'!r}; must end in one of {', '.join(ENDINGS)}")
     text("compression", compression, ("none", "lz4", "zstd"))
     if not flag("overwrite", overwrite) and os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(path))

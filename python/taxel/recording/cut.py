@@ -74,25 +74,19 @@ def cut(
     return [Recording({each._only.facts.label: each._only.region(across, down)}) for each in slices]
 
 
-def _bounds(chosen: slice) -> str:
-    return f"{chosen.start or 0} to {'the last' if chosen.stop is None else chosen.stop}"
-
-
 def _check(array: Array, columns: slice, rows: slice) -> None:
     """Refuse an end beyond an array, or a rectangle without a taxel."""
     (left, right), (top, bottom) = array.region(columns, rows)
-    for name, chosen, count in (("columns", columns, array.columns), ("rows", rows, array.rows)):
-        if any(not -count <= end <= count for end in (chosen.start, chosen.stop) if end is not None):
-            raise ProblemError(
-                f"{name} {_bounds(chosen)}: must be within 0 to {count - 1}, because there are {count} {name}"
-            )
-    if right <= left or bottom <= top:
-        bounds = " and ".join(
-            f"{name} {_bounds(chosen)}"
-            for name, chosen in (("columns", columns), ("rows", rows))
+    sides = (("columns", columns, array.columns), ("rows", rows, array.rows))
+    ends = [(end, count) for _, chosen, count in sides for end in (chosen.start, chosen.stop) if end is not None]
+    if right <= left or bottom <= top or any(not -count <= end <= count for end, count in ends):
+        asked = [
+            f"{name} {chosen.start or 0} to {'the last' if chosen.stop is None else chosen.stop}"
+            for name, chosen, _ in sides
             if chosen != slice(None)
-        )
-        raise ProblemError(f"{bounds}: no taxel is there; the array has {array.columns} columns and {array.rows} rows")
+        ]
+        has = f"the array has {array.columns} columns and {array.rows} rows"
+        raise ProblemError(f"{' and '.join(asked)}: must be within the array, and hold a taxel; {has}")
 
 
 def span_us(recording: Recording) -> tuple[int, int]:

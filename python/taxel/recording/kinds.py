@@ -30,10 +30,10 @@ from taxel.formats.table import read_table
 from taxel.formats.table_form import form_of
 from taxel.reading import ENDINGS, InMemory, Reader
 from taxel.recording.beside import LABELS, is_label_table
-from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
-from taxel.recording.readers.csv import check_head, is_of_taxel, read_csv
-from taxel.recording.readers.lsa import read_lsa
-from taxel.recording.readers.mcap import read_mcap
+from taxel.recording.files.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
+from taxel.recording.files.csv import head_of, is_of_taxel, read_csv
+from taxel.recording.files.lsa import read_lsa
+from taxel.recording.files.mcap import read_mcap
 from taxel.recording.stated import check_size
 
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
@@ -186,9 +186,8 @@ def _is_mcap(path: Path) -> bool:
 
 def _is_csv(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do; a table of labels is none."""
-    if not _ending(".csv")(path) or path.suffix.lower() != ".csv" or is_label_table(path):
-        return False
-    return is_of_taxel(path)
+    is_csv = path.suffix.lower() == ".csv" and path.is_file()
+    return is_csv and not is_label_table(path) and is_of_taxel(path)
 
 
 def _is_npz(path: Path) -> bool:
@@ -283,7 +282,7 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
         case "mcap":
             _core.RecordingReader(path)
         case "csv":
-            check_head(path)
+            head_of(Text(path))
         case "table":
             how = found or Layout(path)
             for text in parts_of(Text(path), how.table)[0].values():

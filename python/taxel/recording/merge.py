@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number, several, shown
-from taxel._base.errors import refused
+from taxel._base.arguments import finite, instance, several
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.events import Events
@@ -21,8 +20,6 @@ from taxel.reading import Facts, InMemory, Marks, Times, Zeroing
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView
 from taxel.verdict import Verdict
-
-T = TypeVar("T")
 
 
 def merge(recordings: Iterable[Recording], *, gap_us: float | None = None) -> Recording:
@@ -58,9 +55,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None) -> Re
     (True, [0, 200], ())
     """
     parts = [instance("recordings", part, Recording)._only for part in several("recordings", recordings)]
-    gap = None if gap_us is None else number("gap_us", gap_us)
-    if gap is not None and not 0 <= gap < 2**52:
-        raise refused("gap_us", f" is {shown(gap_us)}: must be 0 or more")
+    gap = None if gap_us is None else finite("gap_us", gap_us, least=0.0, most=2.0**52)
     if not parts:
         raise ProblemError("recordings: there must be one or more")
     _check(parts)
@@ -101,7 +96,7 @@ def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
 
 def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
     """Return recordings of one sensor as one source in memory."""
-    later = [_later(shift) for shift in shifts]
+    later: list[Times] = [partial(np.add, shift) for shift in shifts]
     tables = [part.table if not k else part.table._moved(t) for part, k, t in zip(parts, shifts, later, strict=True)]
     events = [table for table in tables if isinstance(table, Events)]
     table: Events | Frames = (
@@ -118,6 +113,9 @@ def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
         found += each.detections
     facts = [part.facts for part in parts]
     names = ", ".join(each.name for each in facts)
+    # What they do not all state alike is not stated.
+    stated = {key: {getattr(each, key) for each in facts} for key in ("side", "heel", "columns", "turned", "frame_us")}
+    agreed: dict[str, Any] = {key: values.pop() for key, values in stated.items() if len(values) == 1}
     lost = dict.fromkeys(line for part in parts for line in part.lost)
     for part in parts:
         if part.array != table.array and (part.array._is_measured or part.array.names is not None):
@@ -131,15 +129,11 @@ def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
             array=table.array,
             kind="merged",
             source=f"merged of {names}",
-            side=agreed([each.side for each in facts], ""),
-            heel=agreed([each.heel for each in facts], ""),
             timed=any(each.timed for each in facts),
-            columns=agreed([each.columns for each in facts], ()),
-            turned=agreed([each.turned for each in facts], None),
-            frame_us=agreed([each.frame_us for each in facts], None),
             remarks=tuple(dict.fromkeys(line for each in facts for line in each.remarks)),
             lost=tuple(lost),
             truncated=any(each.truncated for each in facts),
+            **agreed,
         ),
         table,
         Marks(
@@ -186,17 +180,3 @@ def _zeroings(tables: Sequence[Events | Frames], marks: Sequence[Marks]) -> tupl
         if {z for z in together if z.t < stop} != {z for z in each.zeroings if z.t < stop}:
             return None
     return together
-
-
-def _later(shift: int) -> Times:
-    """Return a function that makes times later, us."""
-
-    def times(t: NDArray[np.int64]) -> NDArray[np.int64]:
-        return t + shift
-
-    return times
-
-
-def agreed(values: Sequence[T], otherwise: T) -> T:
-    """Return the value that all have; another where they differ."""
-    return values[0] if all(value == values[0] for value in values) else otherwise

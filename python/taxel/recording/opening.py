@@ -7,18 +7,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 
+import numpy as np
+
 from taxel._base import arguments
 from taxel._base.arguments import instance, shown
 from taxel._base.errors import refused
-from taxel._base.limits import available
+from taxel._base.limits import TAXELS, TIME_US, available
 from taxel._base.messages import first_line, warn
 from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
 from taxel.events import Events
-from taxel.formats.checks import check_table
 from taxel.formats.event_camera import Reduction, reduced
 from taxel.formats.foreign import is_bag, refuse_container
 from taxel.formats.layout import Layout
+from taxel.frames import Frames
 from taxel.labels import Labels, trial_of
 from taxel.reading import ENDINGS, InMemory, Reader
 from taxel.recording.beside import LABELS, labels_for
@@ -91,7 +93,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     Parts of a .mcap are read when they are first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column for each taxel. The layout of
-    a .h5 is described in `taxel.recording.writers.columns`. The reference events of a ``labels.csv`` in a folder
+    a .h5 is described in `taxel.recording.files.columns`. The reference events of a ``labels.csv`` in a folder
     (`taxel.Labels`) become notes of the files of frames that the table names, and so do those of tables beside a
     recording: ``NAME_labels.csv``, ``NAME_events.csv``, ``NAME_events.tsv``, and a label track ``NAME.txt``.
 
@@ -199,7 +201,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     by_name: dict[str, list[Reader]] = {}
     for reader in readers:
         if isinstance(reader, InMemory):
-            check_table(path, reader.data)
+            _check_table(path, reader.data)
         by_name.setdefault(reader.facts.name, []).append(reader)
     opened = [Recording.of(*each) for each in by_name.values()]
     if layout is not None:
@@ -208,11 +210,20 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     return [_of_camera(each, path, options.reduction, layout) for each in opened]
 
 
-def _no_camera(path: Path) -> ProblemError:
-    return ProblemError(
-        f"{path}: region, bin, count_ms and polarity are only for events without intensities, for example of an event "
-        "camera; this file has no such events"
-    )
+def _check_table(location: Path, data: Events | Frames) -> None:
+    """Refuse events or frames of a file whose sensor or times are beyond the limits.
+
+    Raises
+    ------
+    FormatError : too many taxels, or a time farther from 0 than 142 years
+    """
+    rows, columns = data.array.shape
+    if rows * columns > TAXELS:
+        raise FormatError(f"{location}: the sensor has {rows} x {columns} taxels; must have at most {TAXELS}")
+    far = np.flatnonzero((data.t < -TIME_US) | (data.t > TIME_US))
+    if len(far):
+        k = int(far[0])
+        raise FormatError(f"{location}, time {k}: {data.t[k]} us; times must be within {TIME_US} us (142 years) of 0")
 
 
 def _of_camera(recording: Recording, path: Path, given: Reduction, layout: Layout | None) -> Recording:
@@ -229,7 +240,8 @@ def _of_camera(recording: Recording, path: Path, given: Reduction, layout: Layou
     table = source.table if source.facts.has_events and not recording.is_several else None
     if not isinstance(table, Events) or (table.present is not None and table.present.any()):
         if given.is_given:
-            raise _no_camera(path)
+            right = "are only for events without intensities, for example of an event camera"
+            raise ProblemError(f"{path}: region, bin, count_ms and polarity {right}; this file has no such events")
         return recording
     return Recording({source.facts.label: SourceView(source.in_memory(reduced(str(path), table, reduction)))})
 

@@ -71,7 +71,8 @@ def _on_array(recording: Recording, sizes: Sequence[str]) -> Recording:
     if not sizes or recording.kind == "ros":
         return recording
     stated, array = recording.array, of_size(sizes[0], of_wire=False)
-    if _is_row_of(recording, array):
+    are_frames = not recording.has_events and not recording.is_stream and len(recording.sources) < 2
+    if are_frames and is_row_of(stated, array):
         return _on_sensor(recording, array)
     differs = array.pitch_mm is not None and (stated.pitch_mm, stated.places) != (array.pitch_mm, None)
     if stated.shape != array.shape or differs:
@@ -89,9 +90,3 @@ def _on_sensor(recording: Recording, array: Array) -> Recording:
     """Return a recording on another description of its sensor."""
     label = recording._main.facts.label
     return Recording({**recording._sources, label: on_array(recording._main, array)})
-
-
-def _is_row_of(recording: Recording, array: Array) -> bool:
-    """Return whether a recording is of frames that are a row of as many channels as a sensor has taxels."""
-    are_frames = not recording.has_events and not recording.is_stream and len(recording.sources) < 2
-    return are_frames and is_row_of(recording.array, array)

@@ -23,8 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.reading import BoardChange, Datagrams, Reader, Zeroing, kind_of_file
-from taxel.recording.frames import FRAMES_HZ, period_us
-from taxel.recording.gaps import Gaps, gaps_of, with_gaps
+from taxel.recording.frames import FRAMES_HZ, Gaps, gaps_of, period_us, with_gaps
 from taxel.recording.source import SourceView, one_clock, share_clock
 from taxel.tare import Tare
 from taxel.verdict import Verdict
@@ -417,11 +416,6 @@ class Recording:
         """Whether it is a stream of numbers, such as that of an IMU, instead of an array of taxels."""
         return not self.is_several and bool(self._main.facts.columns)
 
-    @property
-    def is_on_clock(self) -> bool:
-        """Whether times were converted to another clock by `on_clock`."""
-        return self._main.view.clock is not None
-
     def datagrams(self) -> Datagrams:
         """Return the raw datagrams as received.
 
@@ -545,19 +539,15 @@ class Recording:
         chosen = self._sources
         if len(chosen) > 1 and not share_clock(chosen):
             # The interval is by the clock of the only sensor.
-            label = self._apart().facts.label
+            if self.is_several:
+                raise ProblemError(
+                    f"{self.path}: the sources ({', '.join(chosen)}) have different clocks, so one interval does not "
+                    "fit all; call on_clock(name) before between"
+                )
+            label = self._main.facts.label
             others = tuple(f"the source {name} (it has another clock)" for name in chosen if name != label)
             chosen = {label: self._main.stated(lost=(*self._main.facts.lost, *others))}
         return Recording({name: source.between(start, stop) for name, source in chosen.items()})
-
-    def _apart(self) -> SourceView:
-        """Return the only sensor beside streams of numbers; refuse several, which have different clocks."""
-        if self.is_several:
-            raise ProblemError(
-                f"{self.path}: the sources ({', '.join(self._sources)}) have different clocks, so one interval does "
-                "not fit all; call on_clock(name) before between"
-            )
-        return self._main
 
     def _why_empty(self) -> str:
         """Return where the events or frames of a recording are of which an empty slice was taken."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -25,17 +25,15 @@ Labelled = Callable[[tuple[Note, ...]], tuple[Note, ...]]
 
 
 class Whole:
-    """All of a source, by the clock and the rate of a view: its slices share what is read."""
+    """All of a source, by the clock of a view: its slices share what is read."""
 
     def __init__(self, reader: Reader, view: View, labelled: Labelled | None) -> None:
-        self.reader, self._times, self._rate_hz, self.labelled = reader, view.times, view.rate_hz, labelled
+        self.reader, self._times, self.labelled = reader, view.times, labelled
 
     @cached_property
     def table(self) -> Events | Frames:
         """The events or the frames."""
         table = self.reader.table()
-        if self._rate_hz is not None and isinstance(table, Frames):
-            return Frames(table.values, times_at(table.t, self._rate_hz), unit=table.unit, array=table.array)
         return table if self._times is None else table._moved(self._times)
 
     @cached_property
@@ -44,8 +42,6 @@ class Whole:
         marks = self.reader.marks()
         if self.labelled is not None:
             marks = replace(marks, notes=self.labelled(marks.notes))
-        if self._rate_hz is not None:
-            return marks.moved(numbers_to_us(self._rate_hz))
         return marks if self._times is None else marks.moved(self._times)
 
     @cached_property
@@ -162,8 +158,7 @@ class SourceView:
     def but(self, **view: Any) -> SourceView:
         """Return another view of the same file."""
         changed = replace(self.view, **view)
-        is_same = changed.times is self.view.times and changed.rate_hz == self.view.rate_hz
-        whole = self._whole if is_same else None
+        whole = self._whole if changed.times is self.view.times else None
         return SourceView(self.reader, changed, self.facts, self._whole.labelled, whole)
 
     def stated(self, **facts: Any) -> SourceView:
@@ -193,12 +188,12 @@ class SourceView:
         """Return the view with times of numbered frames; unchanged of a source with times."""
         if self.facts.timed:
             return self
-        times, view = numbers_to_us(rate_hz), self.view
+        times, view = partial(times_at, rate_hz=rate_hz), self.view
         ends = [
             edge if np.isinf(edge) else float(times(np.array([np.ceil(edge)]))[0]) for edge in (view.start, view.stop)
         ]
         notes = Marks(notes=view.notes).moved(times).notes
-        return self.but(start=ends[0], stop=ends[1], rate_hz=rate_hz, notes=notes).stated(timed=True)
+        return self.but(start=ends[0], stop=ends[1], times=times, notes=notes).stated(timed=True)
 
     def on_clock(self, name: str, times: Times | None) -> SourceView:
         """Return the view by another clock, of this name; None if it is the source's own."""
@@ -242,11 +237,6 @@ def ticks_of(held: NDArray[np.float32] | None) -> NDArray[np.uint16] | None:
     if held is None:
         return None
     return np.where(np.isnan(held), _core.UNKNOWN, held).astype(np.uint16).reshape(-1)
-
-
-def numbers_to_us(rate_hz: float) -> Times:
-    """Return a function that converts numbers of frames to times at a rate, us."""
-    return lambda numbers: times_at(numbers, rate_hz)
 
 
 def share_clock(sources: Mapping[str, SourceView]) -> bool:

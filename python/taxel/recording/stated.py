@@ -62,11 +62,8 @@ def apply_layout(source: SourceView, layout: Layout, *, given: bool) -> SourceVi
     ------
     FormatError : the layout is of another number of taxels, or contradicts the file (names the layout)
     """
-    return source if source.facts.columns else _apply_layout(source, layout, given=given)
-
-
-def _apply_layout(source: SourceView, layout: Layout, *, given: bool) -> SourceView:
-    """Return a source with what its layout says of it."""
+    if source.facts.columns:
+        return source
     facts = source.facts
     kind, name = facts.kind, facts.name
     strict = given or kind not in _STATING

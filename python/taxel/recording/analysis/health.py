@@ -19,7 +19,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded
 from taxel.recorded import recorded as held_by
-from taxel.recording.analysis.quiet import FORCE_UNITS, NOISE_FLOOR, extremes, ticks_by_unit
+from taxel.recording.analysis.rest import FORCE_UNITS, NOISE_FLOOR, extremes, ticks_by_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

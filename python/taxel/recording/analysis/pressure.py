@@ -13,8 +13,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.encode import ContactArea
 from taxel.frames import Frames
-from taxel.recording.analysis.quiet import Readings, held_values, interval
-from taxel.recording.analysis.rest import Rest, loaded_from, rest
+from taxel.recording.analysis.rest import Readings, Rest, held_values, interval, loaded_from, rest
 from taxel.recording.frames import FRAMES_HZ, period_us
 from taxel.recording.recording import Recording
 from taxel.regions import Region

@@ -1,4 +1,4 @@
-"""Reads tables of text that taxel wrote: a .csv of events or of frames.
+"""Tables of text that taxel writes and reads: a .csv of events or of frames.
 
 A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
 and a column a taxel, named ``x3y5``. A spreadsheet may have saved it: with semicolons or tabs, then with decimal commas
@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +23,14 @@ from taxel._base.errors import unreadable
 from taxel._base.header_table import separator_of
 from taxel._base.limits import COLUMNS, TAXELS
 from taxel._base.messages import counted
-from taxel._base.table_text import Text, beginning
+from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.form import Form
 from taxel.formats.layout import Table
 from taxel.formats.lines import odd_lines
-from taxel.formats.table import Rows, events_of, read_rows
+from taxel.formats.table import Rows, around, events_of, read_rows
 from taxel.formats.times import in_order
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
@@ -37,8 +38,9 @@ from taxel.reading import Facts, InMemory
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")
 MORE = ("intensity", "repaired")
+#: Number of frames that are written at once.
+_FRAMES = 4096
 _TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
-_OURS = re.compile(r" *t_us *[,;\t] *(?:x *[,;\t] *y *[,;\t] *p *(?:[,;\t\r\n]|$)|x\d{1,5}y\d{1,5} *(?:[,;\t\r\n]|$))")
 
 
 def read_csv(path: Path, array: Array | None = None) -> InMemory:
@@ -51,7 +53,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     FormatError : another header, or an invalid value (names line and column)
     """
     text = Text(path)
-    names, separator = _head(path, text)
+    names, separator = head_of(text)
     is_comma = separator != "," and any("," in line for line in text.head[1:])
     how = Table(separator=separator, decimal="," if is_comma else ".", time_column=1, time_unit="us")
     how = replace(how, events=tuple(names[:4]) == EVENTS)
@@ -71,32 +73,34 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     return InMemory(Facts(path=path, array=table.array, kind="csv", lost=tuple(lost)), table)
 
 
-def check_head(path: Path) -> None:
-    """Refuse a table whose first line is none of a recording.
-
-    Raises
-    ------
-    FormatError : another header
-    """
-    _head(path, Text(path))
-
-
 def names_in(line: str) -> tuple[list[str], str]:
     """Return the cells of a first line, without blanks around them, and what separates them."""
     separator = separator_of(line)
     return [name.strip() for name in line.split(separator)], separator
 
 
+def first_line_of(path: Path) -> str | None:
+    """Return the first line of a text, "" of an empty one; None of what is no text, as its reader then says."""
+    try:
+        return next(iter(Text(path).lines()), "")
+    except FormatError:
+        return None
+
+
 def is_of_taxel(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do: t_us,x,y,p or t_us,x0y0."""
-    head = beginning(path, 64)
-    is_utf_16 = head.startswith((b"\xff\xfe", b"\xfe\xff"))
-    text = head[: len(head) // 2 * 2].decode("utf-16", "ignore") if is_utf_16 else head.decode("utf-8-sig", "ignore")
-    return _OURS.match(text) is not None
+    names, _ = names_in(first_line_of(path) or "")
+    return tuple(names[:4]) == EVENTS or (names[0] == EVENTS[0] and any(map(_TAXEL.fullmatch, names[1:2])))
 
 
-def _head(path: Path, text: Text) -> tuple[list[str], str]:
-    """Return the names of the columns in the first line, and what separates the cells."""
+def head_of(text: Text) -> tuple[list[str], str]:
+    """Return the names of the columns in the first line, and what separates the cells.
+
+    Raises
+    ------
+    FormatError : none of a recording
+    """
+    path = text.path
     names, separator = names_in(next(iter(text.head), ""))
     if len(names) > COLUMNS:
         raise unreadable(f"{len(names)} columns; must have at most {COLUMNS}", path, line=1)
@@ -147,3 +151,43 @@ def _frames(path: Path, names: Sequence[str], rows: Rows, array: Array | None, s
     frames = np.zeros((len(values), height, width), np.float32)
     frames[:, y, x] = values
     return Frames(frozen_whole(frames), t, array=sensor)
+
+
+def array_in_csv(table: Events | Frames) -> Array:
+    """Return the sensor that a reader of the .csv assumes: the file holds neither name nor pitch."""
+    if isinstance(table, Events):
+        return around(table.x, table.y)
+    return sensor_of(*np.array(_existing(table.array)).reshape(-1, 2).T)
+
+
+def write_csv(file: BinaryIO, table: Events | Frames) -> None:
+    """Write a .csv."""
+    if isinstance(table, Frames):
+        places = _existing(table.array)
+        names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
+        file.write(names.encode() + b"\n")
+        x, y = np.array(places).T
+        for k in range(0, len(table), _FRAMES):
+            values = table.values[k : k + _FRAMES, y, x]
+            # Each value is written once; as bits, because 0 equals -0.
+            bits, positions = np.unique(values.view(np.uint32), return_inverse=True)
+            # str of a float32 is the shortest text that reads back as the same value; -0 would read back as a whole 0.
+            texts = np.array([re.sub(r"(?<!^-0)\.0$", "", str(value)) for value in bits.view(np.float32)], object)
+            rows = texts[positions.reshape(values.shape)].tolist()
+            times = table.t[k : k + _FRAMES].tolist()
+            file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
+        return
+    import pandas as pd  # noqa: PLC0415  takes long
+
+    columns: dict[str, Any] = dict(zip(EVENTS, (table.t, table.x, table.y, table.p.astype(np.uint8)), strict=True))
+    if table.intensity is not None and table.present is not None:
+        columns["intensity"] = pd.arrays.IntegerArray(table.intensity.copy(), ~table.present)
+    if table.repaired is not None:
+        columns["repaired"] = table.repaired.astype(np.uint8)
+    pd.DataFrame(columns).to_csv(file, index=False, lineterminator="\n")
+
+
+def _existing(array: Array) -> list[tuple[int, int]]:
+    """Return column and row of each taxel that exists, row by row."""
+    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
+    return [(int(x), int(y)) for y, x in np.argwhere(exists)]

@@ -1,7 +1,9 @@
-"""Reads a table by its columns: a .npz or .h5 that taxel wrote, or one with these columns; and a .npy of events.
+"""A table by its columns: a .npz or .h5 that taxel writes, or one with these columns; and a .npy of events.
 
-Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; frames are
-``values t unit``, those without times ``values number unit``. ``array`` is the sensor as JSON.
+The root of a .h5 has the attribute ``taxel`` (2, the layout's version). Events are the data sets ``t`` (int64, us),
+``x``, ``y`` (uint16), ``p`` (bool), optionally ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
+``markers`` (int64, two columns: us, whether a start); frames are ``values`` (float32, frames x rows x columns) with
+``unit`` (text) and ``t``, or ``number`` if they have no times. ``array`` is the sensor as JSON.
 """
 
 from __future__ import annotations
@@ -9,21 +11,24 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arrays import hdf5, read_arrays, shapes
+from taxel._base.arrays import hdf5, read_arrays, shapes, write_hdf5
 from taxel._base.columns import frozen_whole
-from taxel._base.errors import refused
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.checks import around
+from taxel.formats.table import around
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
+from taxel.recording.stated import check_size
+
+if TYPE_CHECKING:
+    import h5py
 
 #: The columns of events.
 EVENTS: tuple[str, ...] = ("t", "x", "y", "p")
@@ -43,6 +48,8 @@ DTYPES: dict[str, type[np.generic]] = {
 #: The attribute of a .h5 that has the version of its layout.
 MARK = "taxel"
 VERSION = 2
+#: Size of the chunks of a data set, which are compressed one by one.
+_PIECE_BYTES = 1 << 20
 
 
 def is_table(names: tuple[str, ...]) -> bool:
@@ -126,8 +133,7 @@ def from_columns(path: Path, kind: str, columns: Mapping[str, NDArray[Any]], arr
     values = columns.get("values")
     if array is not None and values is not None and values.ndim == 3 and values.shape[1:] != array.shape:
         if values.shape[1:] != (1, array.rows * array.columns):
-            shape = " x ".join(map(str, values.shape[1:]))
-            raise refused("array", f" has {array.rows} x {array.columns} taxels; the frames of {path} have {shape}")
+            check_size(path, values.shape[1:], array)
         values = values.reshape(-1, *array.shape)
     try:
         if values is not None:
@@ -150,3 +156,49 @@ def _sensor(path: Path, document: str) -> Array:
         return Array._from_geometry(dict(json.loads(document)))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, ProblemError) as error:
         raise FormatError(f"{path}, {SENSOR}: {first_line(error)}; must be a sensor as taxel writes it") from None
+
+
+def columns_of(table: Events | Frames, *, timed: bool) -> dict[str, NDArray[Any]]:
+    """Return a table as columns by name."""
+    columns: dict[str, NDArray[Any]]
+    if isinstance(table, Frames):
+        columns = {"values": table.values, "t" if timed else "number": table.t, "unit": np.array(table.unit)}
+    else:
+        columns = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
+        if table.intensity is not None and table.present is not None:
+            columns |= {"intensity": table.intensity, "present": table.present}
+        if table.repaired is not None:
+            columns["repaired"] = table.repaired
+        columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
+    return columns | {SENSOR: np.array(json.dumps(table.array._geometry()))}
+
+
+def write_npz(file: BinaryIO, table: Events | Frames, *, timed: bool) -> None:
+    """Write a .npz."""
+    columns: dict[str, Any] = columns_of(table, timed=timed)
+    np.savez_compressed(file, **columns)
+
+
+def write_h5(path: Path, table: Events | Frames, *, timed: bool, overwrite: bool) -> None:
+    """Write a .h5.
+
+    Raises
+    ------
+    As `taxel._base.arrays.write_hdf5`.
+    """
+
+    def write(h5: h5py.File) -> None:
+        h5.attrs[MARK] = VERSION
+        for name, column in columns_of(table, timed=timed).items():
+            if not column.ndim:
+                h5.create_dataset(name, data=str(column))
+            elif not column.size:
+                h5.create_dataset(name, data=column)
+            else:
+                rows = min(len(column), max(1, _PIECE_BYTES // column[:1].nbytes))
+                chunks = (rows, *column.shape[1:])
+                h5.create_dataset(
+                    name, data=column, chunks=chunks, compression="gzip", compression_opts=4, shuffle=True
+                )
+
+    write_hdf5(path, write, overwrite=overwrite)

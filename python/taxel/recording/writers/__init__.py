@@ -1,1 +1,0 @@
-"""Writers of recordings, one module for each kind of file."""
