@@ -3,7 +3,7 @@
 use super::augmented::{Found, WarmStart};
 use crate::Stop;
 use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Objective, Parts, Point, Program, Proof, Relaxed, Rows, Tangents};
+use crate::learn::statement::{Objective, Parts, Point, Program, Proof, Relaxed, Rows};
 use crate::vectors::dot;
 
 /// The weights found, with what proves them.
@@ -67,14 +67,8 @@ impl Program<'_> {
     fn prove(&self, point: &Point, multipliers: &[f64]) -> Proof {
         let length = dot(&point.weights, &point.weights).sqrt();
         let pull = if length > 0.0 { self.objective.l2 / length } else { 0.0 };
-        let at = Tangents {
-            weights: &point.weights,
-            excess: &point.excess,
-            behind: &point.behind,
-            multipliers,
-            pull: &point.weights.iter().map(|w| pull * w).collect::<Vec<_>>(),
-        };
-        self.proof(&at, point.parts.sum())
+        let pull: Vec<f64> = point.weights.iter().map(|w| pull * w).collect();
+        self.proof(point, multipliers, &pull, point.parts.sum())
     }
 
     /// Starts from a similar fit: solves over the rows that are near their kinks there, until no other row matters.
