@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use taxel_core::board::{Board, BoardCounts, Crossed, IntensityWord, Previous, Version2};
+use taxel_core::board::{Board, BoardCounts, BoardOptions, Crossed};
 use taxel_core::circuit::Chain;
 use taxel_core::wire::v2::{self, DatagramOutcome};
 use taxel_core::wire::{self, Command, CutDatagrams, Decoder, Registers};
@@ -283,12 +283,8 @@ pub fn registers_commands(source: &str, target: &str, array: ArrayIn) -> PyResul
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WireBoardOptions {
-    previous: Previous,
-    intensity: IntensityWord,
-    queue: usize,
-    version_2: Version2,
+    board: BoardOptions,
     circuit: Option<Chain>,
-    asynchronous: bool,
 }
 
 /// The emulated board, and the circuit through which it reads.
@@ -301,13 +297,8 @@ impl WireBoard {
     #[new]
     fn new(registers: &str, array: ArrayIn, options: &str) -> PyResult<Self> {
         let (registers, array): (Registers, _) = (parsed("registers", registers)?, array.0);
-        let WireBoardOptions { previous, intensity, queue, version_2, circuit, asynchronous } =
-            parsed("options", options)?;
-        let mut board = Board::new(registers, &array).map_err(core)?;
-        board = board.previous(previous).intensity(intensity).queue(queue).version_2(version_2).map_err(core)?;
-        if asynchronous {
-            board = board.asynchronous().map_err(core)?;
-        }
+        let WireBoardOptions { board, circuit } = parsed("options", options)?;
+        let board = Board::with_options(registers, &array, board).map_err(core)?;
         let crossed = circuit.map(|chain| Crossed::new(chain, &registers, &array)).transpose().map_err(core)?;
         Ok(Self(Exclusive::new((board, crossed))))
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
-use taxel_core::board::{Board, IntensityWord, Version2};
+use taxel_core::board::{Board, BoardOptions, IntensityWord, Version2};
 use taxel_core::wire::Registers;
 use taxel_core::wire::v2::{DatagramHeader, DatagramOutcome, Decoder};
 use taxel_core::{Array, Events};
@@ -90,7 +90,9 @@ fn repeated_states_repair_the_values_after_a_loss() {
     let registers = Registers { wire_version: 2, lines: 16, noise_floor: 0, ..Registers::default() };
     for intensity in [IntensityWord::Value, IntensityWord::Difference] {
         let version_2 = Version2 { states_us: 20_000, ..Version2::default() };
-        let mut board = Board::new(registers, &array).unwrap().intensity(intensity).version_2(version_2).unwrap();
+        let mut board =
+            Board::with_options(registers, &array, BoardOptions { intensity, version_2, ..BoardOptions::default() })
+                .unwrap();
         let mut decoder = Decoder::new(array.clone());
         let mut events = Events::empty(array.clone());
         let mut frames = scene(&mut random, &array, 200, 150);

@@ -99,17 +99,12 @@ impl ConeR {
     }
 }
 
-/// The multipliers from which a similar fit starts: the nonzero ones, by row (silent rows first, then targets, then B).
+/// The multipliers from which a similar fit starts: the nonzero ones, by row, ascending (silent rows first, then targets,
+/// then B).
 ///
 /// Each is a share of its row's weight in 6.14 (of twice that weight for a C of both sides): from 0 to 1 for a silent
 /// row; for a target from -1/2 to 1/2, from -1 to 0 if C counts only potentials below; likewise for B, if it is a sum.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Shares {
-    /// The numbers of the rows, ascending.
-    pub rows: Vec<usize>,
-    /// The share of each of these rows.
-    pub values: Vec<f64>,
-}
+pub type Shares = Vec<(usize, f64)>;
 
 /// The slopes of the tangents below the terms of 6.14 that prove the gap of a fit: the nonzero ones, 1/mV. In CONE-X
 /// (6.11) the rows are hard, and have multipliers instead of D and C.
@@ -275,8 +270,8 @@ impl ConeRProblem {
     /// `parameters` may differ from those of the problem in `lambdas`, `kappa`, bounds, divisors, sides, `norm`,
     /// and `tolerance`; the others are part of the rows. `silent` are the largest absolute weights (mV) of
     /// trains without a spike, which were left out of the rows but count in the normalisers. `start` are the weights of
-    /// a similar fit, with its multipliers if that fit had the same rows; a closer start is faster. If a stop is
-    /// requested, `fit` returns the best weights so far.
+    /// a similar fit, with its multipliers if that fit had the same rows; a closer start is faster. The neuron is then run on
+    /// `only` one pattern if it is named. If a stop is requested, `fit` returns the best weights so far.
     ///
     /// # Errors
     ///
@@ -286,19 +281,7 @@ impl ConeRProblem {
         parameters: &ConeR,
         silent: &[f64],
         start: Option<(&[f64], Option<&Shares>)>,
-        progress: &mut dyn FnMut(Round),
-        stop: Stop<'_>,
-    ) -> Result<ConeRFit> {
-        self.fit_counting(parameters, silent, start, None, progress, stop)
-    }
-
-    /// Fits like `fit`; counts refiring on one pattern alone if it is named.
-    pub(crate) fn fit_counting(
-        &self,
-        parameters: &ConeR,
-        silent: &[f64],
-        start: Option<(&[f64], Option<&Shares>)>,
-        pattern: Option<usize>,
+        only: Option<usize>,
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<ConeRFit> {
@@ -315,11 +298,10 @@ impl ConeRProblem {
             progress(Round { round, rows: found.rows, objective: found.objective, left });
         }
         let weights: Vec<f64> = found.weights.iter().map(|w| w * unit).collect();
-        let (refires, fired) = self.firing(&weights, pattern)?;
-        let kept = || found.shares.iter().enumerate().filter(|s| *s.1 != 0.0);
+        let (refires, fired) = self.firing(&weights, only)?;
         Ok(ConeRFit {
             rows: found.rows,
-            multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
+            multipliers: found.shares.into_iter().enumerate().filter(|(_, share)| *share != 0.0).collect(),
             unreachable: self.unreachable(&objective),
             refires,
             fired,
@@ -362,7 +344,7 @@ impl ConeRProblem {
         let program = self.rows.program(objective);
         let all = program.rows();
         let mut shares = vec![0.0; all];
-        for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
+        for &(row, share) in multipliers {
             let Some(entry) = shares.get_mut(row) else {
                 return Err(problem!("start"; ": has a multiplier of row {row}, but there are only {all} rows"));
             };
