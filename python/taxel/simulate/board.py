@@ -221,10 +221,8 @@ class Board:
     ) -> None:
         self.array = Array._of(array)
         start = Registers(array=self.array) if registers is None else instance("registers", registers, Registers)
-        board = {
-            **board_options(previous, intensity, version_2, asynchronous),
-            "queue": integer("queue", queue, 0, 2**32),
-        }
+        board = board_options(previous, intensity, version_2, asynchronous)
+        board["queue"] = integer("queue", queue, 0, 2**32)
         options = {"board": board, "circuit": lines_of(circuit, asynchronous)}
         self._core = _core.WireBoard(start._json(), self.array, json.dumps(options))
 
