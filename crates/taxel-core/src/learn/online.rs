@@ -5,9 +5,9 @@
 //! scratch.
 
 use crate::allowed::{Parameter, Range};
-use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, PatternDemand, Shares};
+use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, Shares};
 use crate::learn::fit::Round;
-use crate::learn::statement::{check_example, check_silence};
+use crate::learn::statement::{check_example, check_silence, check_trains};
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -73,14 +73,15 @@ impl OnlineConeR {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.added, pattern, targets)?;
         check_silence(self.added, silence)?;
-        let end = parameters.end_of(self.added, pattern, targets)?;
         if self.added == 0 {
             self.problem = ConeRProblem::without_patterns(parameters, pattern.len());
         }
         let problem = &mut self.problem;
+        if let Some(first) = problem.patterns.first() {
+            check_trains(self.added, pattern, first.len())?;
+        }
         let [_, before] = problem.rows_by_kind();
-        problem.check_trains(self.added, pattern)?;
-        problem.push(pattern, PatternDemand { targets, silence, end }, stop)?;
+        problem.push((self.added, pattern), targets, silence, stop)?;
         let mut gone = [0; 3];
         if self.added >= self.window {
             [gone, _] = problem.rows_by_kind();
@@ -105,7 +106,7 @@ impl OnlineConeR {
         }
         let problem = &self.problem;
         let start = self.last.as_ref().map(|(weights, shares)| (weights.as_slice(), Some(shares)));
-        let fit = problem.fit(&self.parameters, &[], start, Some(problem.patterns() - 1), progress, stop)?;
+        let fit = problem.fit(&self.parameters, &[], start, Some(problem.patterns.len() - 1), progress, stop)?;
         self.last = Some((fit.fit.weights.clone(), fit.multipliers.clone()));
         Ok(fit)
     }

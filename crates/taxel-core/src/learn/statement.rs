@@ -27,7 +27,6 @@ pub use objective::{Divisor, DivisorC, DivisorD, FormB, Norm, Parts, Sides};
 pub(crate) use peak::{SilencePeak, exceeds, largest};
 pub(crate) use program::{Point, Program, Proof, Rows};
 pub(crate) use relaxed::Relaxed;
-pub(crate) use rows::end_of;
 pub use rows::{Margin, Row, StatedRow, Statement};
 pub(crate) use silence::Silence;
 pub(crate) use targets::Targets;

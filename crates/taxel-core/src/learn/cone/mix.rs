@@ -83,7 +83,7 @@ impl Exact {
             let meets = if gap <= aim || ended { rows.meet(objective, &self.targets, &point, stop)? } else { None };
             let met = meets.as_ref().unwrap_or(&point.weights);
             let tolerance = if gap > NEAR { NEAR_SHARE * theta_0 } else { self.rounding(met) };
-            let broken = self.broken(met, ASKED_SHARE, tolerance);
+            let broken = self.silence.broken(met, ASKED_SHARE, tolerance);
             let objective_there = self.parts(met).sum();
             let left = Left::Broken(broken.len());
             progress(Round { round: best.rounds, rows: rows.names.len(), objective: objective_there, left });

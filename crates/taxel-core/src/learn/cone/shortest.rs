@@ -62,7 +62,7 @@ impl Exact {
                 }
                 // Where rounding leaves some rows undecided, others may refute the problem; `report` checks all.
                 None => {
-                    let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
+                    let broken = self.silence.broken(&weights, ASKED_SHARE, self.rounding(&weights));
                     let rows = working.present.len();
                     let objective = self.parts(&weights).sum();
                     progress(Round { round: rounds, rows, objective, left: Left::Broken(broken.len()) });
