@@ -323,11 +323,8 @@ impl Layer {
     }
 
     /// Forgets the latest touches.
-    fn forget(&self, py: Python<'_>) -> PyResult<()> {
-        self.0.enter(py, |layer, _| {
-            layer.forget();
-            Ok::<_, Error>(())
-        })
+    fn forget(&self, py: Python<'_>) {
+        self.0.with(py, Bonded::forget);
     }
 }
 

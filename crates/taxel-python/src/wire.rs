@@ -4,7 +4,6 @@ use std::borrow::Cow;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use taxel_core::board::{Board, BoardCounts, BoardOptions, Crossed};
@@ -167,16 +166,15 @@ pub fn wire_cut<'py>(py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResul
 
 /// Events as bytes.
 #[pyfunction]
-pub fn wire_encode<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
+pub fn wire_encode(py: Python<'_>, events: EventsIn<'_>) -> PyResult<Vec<u8>> {
     let events = events.view()?;
-    let bytes = enter(py, |_| wire::encode(events))?;
-    Ok(PyBytes::new(py, &bytes))
+    enter(py, |_| wire::encode(events))
 }
 
 /// A command's five bytes.
 #[pyfunction]
-pub fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound<'_, PyBytes>> {
-    Ok(PyBytes::new(py, &Command::new(register, value).map_err(core)?.to_bytes()))
+pub fn command_bytes(register: u8, value: u32) -> PyResult<[u8; 5]> {
+    Ok(Command::new(register, value).map_err(core)?.to_bytes())
 }
 
 /// Register and value of a command's five bytes.
@@ -335,16 +333,16 @@ impl WireBoard {
     }
 
     /// Scans one frame; returns the datagrams, of which the sink takes at most so many.
-    fn frame<'py>(
+    fn frame(
         &self,
-        py: Python<'py>,
-        ticks: PyReadonlyArray1<'py, u16>,
+        py: Python<'_>,
+        ticks: PyReadonlyArray1<'_, u16>,
         most: usize,
-        accepted: Option<PyReadonlyArray1<'py, bool>>,
-    ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+        accepted: Option<PyReadonlyArray1<'_, bool>>,
+    ) -> PyResult<Vec<Vec<u8>>> {
         let (ticks, mut sent) = (slice("ticks", &ticks)?, vec![]);
         let accepted = accepted.as_ref().map(|accepted| slice("accepted", accepted)).transpose()?;
-        let datagrams = self.0.enter(py, |(board, crossed), _| {
+        self.0.enter(py, |(board, crossed), _| {
             let mut ticks = Cow::from(ticks);
             // The board refuses a frame of another length.
             if let Some(crossed) = crossed
@@ -360,8 +358,7 @@ impl WireBoard {
                 room
             })?;
             Ok::<_, Error>(sent)
-        })?;
-        Ok(datagrams.iter().map(|d| PyBytes::new(py, d)).collect())
+        })
     }
 
     fn counts(&self, py: Python<'_>) -> Plain<BoardCounts> {

@@ -108,7 +108,8 @@ impl Exact {
                 "pattern {pattern}: at {t} ms, the potential is {excess:.1e} mV too high for silence"
             )));
         }
-        let worst = self.misses(weights).enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
+        let worst =
+            self.misses(weights).enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((k, miss)) = worst.filter(|_| self.is_grid()) {
             let ((pattern, target), t, miss) = (self.targets.names[k], self.targets.times[k], miss * unit);
             return Ok(Some(format!(

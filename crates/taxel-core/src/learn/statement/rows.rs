@@ -157,13 +157,7 @@ pub(crate) struct Example {
 /// # Errors
 ///
 /// `Problem` if a target, or the pattern's start, is after the horizon.
-fn end_of(
-    neuron: &Neuron,
-    horizon: Option<f64>,
-    p: usize,
-    pattern: &SpikeTrains,
-    targets: &[f64],
-) -> Result<f64> {
+fn end_of(neuron: &Neuron, horizon: Option<f64>, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<f64> {
     let last = targets.last();
     let Some(end) = horizon else { return Ok(last.map_or(pattern.stop, |last| pattern.stop.max(last + neuron.tau))) };
     if let Some(last) = last.filter(|last| **last > end) {
