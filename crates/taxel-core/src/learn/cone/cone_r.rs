@@ -226,14 +226,15 @@ impl ConeRProblem {
     /// The objective 6.14 with these parameters, in this problem's units.
     fn objective(&self, parameters: &ConeR, silent: &[f64]) -> Result<Objective> {
         let bounds = bounds_of(&parameters.lb, &parameters.ub, self.rows.trains)?;
-        let ConeR { lambdas, kappa, norm, form_b, .. } = *parameters;
+        let ConeR { lambdas, kappa, norm, form_b, sides_b, sides_c, .. } = *parameters;
         let choice = Choice {
             lambdas,
             kappa,
             norm,
             form_b,
             divisors: (parameters.divide_b_by, parameters.divide_c_by, parameters.divide_d_by),
-            sides: (parameters.sides_b, parameters.sides_c),
+            sides_b,
+            sides_c,
         };
         let d_max = |most: &[f64]| self.rows.most_broken_silence(most);
         let unit = self.statement.unit;

@@ -193,7 +193,8 @@ impl ConeXProblem {
             norm: parameters.norm,
             form_b: parameters.form_b,
             divisors: (parameters.divide_b_by, DivisorC::default(), DivisorD::default()),
-            sides: (Sides::Both, Sides::Both),
+            sides_b: Sides::Both,
+            sides_c: Sides::Both,
         };
         let objective = |targets: &_| Objective::new(choice, bounds, &[], targets, unit, |_| 0.0);
         let exact = Exact::new(statement, parameters.delta_t(), objective, parameters.tolerance, stop)?;

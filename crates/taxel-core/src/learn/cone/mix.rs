@@ -48,7 +48,7 @@ impl Exact {
         let nothing = objective.nothing_of_b(&self.targets);
         let theta_0 = self.statement.neuron.theta_0;
         let trains = self.statement.trains;
-        let squares = objective.b > 0.0 && objective.form_b == FormB::Square;
+        let squares = objective.b > 0.0 && objective.choice.form_b == FormB::Square;
         let gram = if squares { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
         let mut rows = Written::new(self, &best, start)?;
         let mut state = Between::at(best.weights.clone(), rows.multipliers());
@@ -268,7 +268,7 @@ impl Written {
         let (mut at, mut wanted) = (targets.at.clone(), targets.thresholds.clone());
         for (k, _) in after.filter(|(_, x)| x.abs() <= AT_LIMIT * worst) {
             at.extend_from_slice(targets.row(k).behind);
-            wanted.push(objective.kappa * targets.thresholds[k]);
+            wanted.push(objective.choice.kappa * targets.thresholds[k]);
         }
         let near = |k: &usize| rows[*k] >= -AT_LIMIT * worst;
         let near: Vec<usize> = (0..self.names.len()).filter(near).collect();

@@ -147,7 +147,7 @@ impl Exact {
         let least: Vec<f64> = sum.iter().zip(lower.iter().zip(upper)).map(|(g, (l, u))| (-g).clamp(*l, *u)).collect();
         let square = dot(&least, &least);
         let bound = self.objective.l2_term((2.0 * (0.5 * square + dot(&sum, &least) - allowed)).max(0.0));
-        let factor = match self.objective.norm {
+        let factor = match self.objective.choice.norm {
             Norm::Norm if square > 0.0 => self.objective.l2 / square.sqrt(),
             Norm::Norm => 0.0,
             Norm::Square => 2.0 * self.objective.l2,

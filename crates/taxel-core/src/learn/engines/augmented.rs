@@ -376,7 +376,7 @@ impl<'a> Lagrangian<'a> {
             add(&mut pull, factor.abs().max(most), row);
         }
         for target in program.targets.iter().take(self.at.behind.len()) {
-            add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, target.behind);
+            add(&mut pull, 2.0 * objective.b * objective.choice.kappa * target.threshold, target.behind);
         }
         let most = (dot(&pull, &pull) / n).sqrt();
         (objective.l1 + objective.l2 / n.sqrt()).max(share * most).max(1e-12) / self.width
@@ -436,7 +436,7 @@ impl<'a> Lagrangian<'a> {
         self.gradient.fill(0.0);
         program.add_rows(&self.factors, &mut self.gradient);
         program.add_slope_of_b(&self.at.behind, &mut self.gradient);
-        match o.norm {
+        match o.choice.norm {
             Norm::Square => add(&mut self.gradient, 2.0 * o.l2, &self.at.weights),
             Norm::Norm => {
                 let pull = self.pull();
@@ -471,13 +471,7 @@ impl<'a> Lagrangian<'a> {
         let o = self.program.objective;
         let z = w + self.held[n] / self.sigma;
         let shift = o.l1 / self.sigma;
-        let soft = if z > shift {
-            z - shift
-        } else if z < -shift {
-            z + shift
-        } else {
-            0.0
-        };
+        let soft = (z - shift).max(0.0) + (z + shift).min(0.0);
         let at = soft.clamp(o.bounds.lower[n], o.bounds.upper[n]);
         let held = at != soft || (soft == 0.0 && shift > 0.0);
         // Not computed as sigma (z - at): z, at and w may be close and sigma large, which would lose digits.

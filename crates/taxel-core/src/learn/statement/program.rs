@@ -96,7 +96,7 @@ impl Program<'_> {
 
     /// The number of rows after targets: none if B is a sum of squares.
     pub(crate) fn sums(&self) -> usize {
-        if self.objective.form_b == FormB::Sum { self.targets.len() } else { 0 }
+        if self.objective.choice.form_b == FormB::Sum { self.targets.len() } else { 0 }
     }
 
     /// The number of rows.
@@ -118,7 +118,7 @@ impl Program<'_> {
 
     /// The rows of the targets and those after them: coefficients, and the potential that they ask for, mV.
     pub(crate) fn stored(&self) -> impl Iterator<Item = (&[f64], f64)> {
-        let kappa = self.objective.kappa;
+        let kappa = self.objective.choice.kappa;
         let after = self.targets.iter().take(self.sums()).map(move |row| (row.behind, kappa * row.threshold));
         self.targets.iter().map(|row| (row.at, row.threshold)).chain(after)
     }
@@ -200,7 +200,7 @@ impl Program<'_> {
             bound: self.bound(at, multipliers, pull, most),
             multipliers: multipliers.to_vec(),
             behind: squares.chain(after).collect(),
-            pull: match objective.norm {
+            pull: match objective.choice.norm {
                 Norm::Square => at.weights.iter().map(|w| 2.0 * objective.l2 * w).collect(),
                 Norm::Norm => pull.to_vec(),
             },
@@ -230,7 +230,7 @@ impl Program<'_> {
         self.add_rows(multipliers, &mut gradient);
         self.add_slope_of_b(&at.behind, &mut gradient);
         let mut bound: f64 = at.behind.iter().map(|&x| objective.b * objective.counts_in_b(x).powi(2)).sum();
-        match objective.norm {
+        match objective.choice.norm {
             Norm::Square => {
                 add(&mut gradient, 2.0 * objective.l2, &at.weights);
                 bound += objective.l2 * dot(&at.weights, &at.weights);

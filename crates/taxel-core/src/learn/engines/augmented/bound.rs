@@ -27,17 +27,11 @@ impl Lagrangian<'_> {
         };
         let multipliers: Vec<f64> = zero.excess.iter().enumerate().map(slope).collect();
         let mut pull = vec![0.0; self.at.weights.len()];
-        if o.norm == Norm::Norm && o.l2 > 0.0 && zero.weights.iter().all(|&w| w == 0.0) {
+        if o.choice.norm == Norm::Norm && o.l2 > 0.0 && zero.weights.iter().all(|&w| w == 0.0) {
             program.add_rows(&multipliers, &mut pull);
             program.add_slope_of_b(&zero.behind, &mut pull);
             for (n, p) in pull.iter_mut().enumerate() {
-                let soft = if *p > o.l1 {
-                    *p - o.l1
-                } else if *p < -o.l1 {
-                    *p + o.l1
-                } else {
-                    0.0
-                };
+                let soft = (*p - o.l1).max(0.0) + (*p + o.l1).min(0.0);
                 let free = if soft > 0.0 { o.bounds.lower[n] < 0.0 } else { o.bounds.upper[n] > 0.0 };
                 *p = if free { -soft } else { 0.0 };
             }

@@ -32,11 +32,11 @@ impl Lagrangian<'_> {
                 self.at.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
             let square = dot(direction, direction);
             let (mut from, mut bend) = (self.rho * against, self.rho * square);
-            if o.sides_b == Sides::Both {
+            if o.choice.sides_b == Sides::Both {
                 from += 2.0 * o.b * dot(&self.at.behind, &lift);
                 bend += 2.0 * o.b * dot(&lift, &lift);
             }
-            if o.norm == Norm::Square {
+            if o.choice.norm == Norm::Square {
                 from += 2.0 * o.l2 * dot(&self.at.weights, direction);
                 bend += 2.0 * o.l2 * square;
             }
@@ -116,7 +116,7 @@ impl Lagrangian<'_> {
     ) -> f64 {
         let mut sum = smooth.0 + t * smooth.1 + steady;
         let o = self.program.objective;
-        if o.sides_b == Sides::Below {
+        if o.choice.sides_b == Sides::Below {
             for (&x, &l) in self.at.behind.iter().zip(lift) {
                 sum += 2.0 * o.b * (x + t * l).min(0.0) * l;
             }
@@ -132,7 +132,7 @@ impl Lagrangian<'_> {
             along += weight * d;
             square += weight * weight;
         }
-        if o.norm == Norm::Norm {
+        if o.choice.norm == Norm::Norm {
             sum += o.l2 * along / self.length(square);
         }
         sum

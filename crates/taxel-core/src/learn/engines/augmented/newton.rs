@@ -75,7 +75,7 @@ impl Lagrangian<'_> {
             rows.extend(program.stored_row(k - silent).iter().map(|v| root * v));
         }
         let mut count = written.len() + self.inside.len() - kept;
-        if o.sides_b == Sides::Below {
+        if o.choice.sides_b == Sides::Below {
             let root = (2.0 * o.b).sqrt();
             for (target, _) in program.targets.iter().zip(&self.at.behind).filter(|(_, behind)| **behind < 0.0) {
                 rows.extend(target.behind.iter().map(|v| root * v));
@@ -83,13 +83,14 @@ impl Lagrangian<'_> {
             }
         }
         let length = self.length(dot(&self.at.weights, &self.at.weights));
-        let (ridge, concave) = match o.norm {
+        let (ridge, concave) = match o.choice.norm {
             Norm::Square => (2.0 * o.l2, 0.0),
             Norm::Norm => (o.l2 / length, o.l2 / (length * length * length)),
         };
         let held = |i: usize| if self.penalty(i, self.at.weights[i]).1 { self.sigma } else { 0.0 };
         let diagonal = (0..n).map(|i| ridge + self.rho + held(i)).collect();
-        let both_sides = if (o.form_b, o.sides_b) == (FormB::Square, Sides::Both) { 2.0 * o.b } else { 0.0 };
+        let both_sides =
+            if (o.choice.form_b, o.choice.sides_b) == (FormB::Square, Sides::Both) { 2.0 * o.b } else { 0.0 };
         Curvature { rows, count, both_sides, diagonal, concave }
     }
 
