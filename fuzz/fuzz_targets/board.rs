@@ -4,7 +4,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use taxel_core::board::{Board, DATAGRAM_WORDS};
+use taxel_core::board::{Board, BoardOptions, DATAGRAM_WORDS};
 use taxel_core::wire::v2::{self, DATAGRAM_BYTES, DatagramHeader};
 use taxel_core::wire::{Decoder, Registers, WORD_BYTES};
 use taxel_core::{Array, Events};
@@ -12,7 +12,8 @@ use taxel_core::{Array, Events};
 fuzz_target!(|input: &[u8]| {
     let Some((&[queue, commands, takes], rest)) = input.split_first_chunk::<3>() else { return };
     let array = Array::new(8, 64, 1.0, "fuzz").unwrap();
-    let mut board = Board::new(Registers::default(), &array).unwrap().queue(8 * usize::from(queue));
+    let options = BoardOptions { queue: 8 * usize::from(queue), ..BoardOptions::default() };
+    let mut board = Board::with_options(Registers::default(), &array, options).unwrap();
     let (serial, touch) = rest.split_at(rest.len().min(commands.into()));
     let answers = ["ok REG", "bad REG", "taxel-board v", "status frames="];
     assert!(board.command(serial).lines().all(|line| answers.iter().any(|begin| line.starts_with(begin))));

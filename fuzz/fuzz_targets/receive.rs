@@ -16,10 +16,8 @@ fuzz_target!(|input: &[u8]| {
     while let Some((&[kind, length, wait], after)) = rest.split_first_chunk::<3>() {
         let (piece, after) = after.split_at(after.len().min(usize::from(length)));
         rest = after;
-        let mut datagram = piece.to_vec();
-        if kind & 1 == 0 && piece.len() >= HEADER_BYTES {
-            seal(piece, kind, &mut datagram);
-        }
+        let seals = kind & 1 == 0 && piece.len() >= HEADER_BYTES;
+        let datagram = if seals { seal(piece, kind) } else { piece.to_vec() };
         assert!(datagram.len() <= DATAGRAM_BYTES);
         took += i64::from(wait) as u64;
         let arrived = (way & 2 != 0).then_some((took as i64) << (way >> 2));
@@ -46,7 +44,7 @@ fuzz_target!(|input: &[u8]| {
 });
 
 /// A datagram of version 2 whose checksum holds: its header's first bytes from the piece, few boards and sessions.
-fn seal(piece: &[u8], kind: u8, out: &mut Vec<u8>) {
+fn seal(piece: &[u8], kind: u8) -> Vec<u8> {
     let (head, body) = piece.split_at(HEADER_BYTES);
     let header = DatagramHeader {
         kind: head[1] & 0xf,
@@ -59,5 +57,5 @@ fn seal(piece: &[u8], kind: u8, out: &mut Vec<u8>) {
         flags: head[17],
         span: u16::from_le_bytes([head[3], head[15]]),
     };
-    header.write(body, out);
+    header.datagram(body)
 }

@@ -21,9 +21,7 @@ fuzz_target!(|input: &[u8]| {
         base = if flags & 0x1c == 0x1c { u64::from(on) } else { base + u64::from(on) };
         let (sequence, line) = (datagrams.len() as u32, if kind & 0x40 == 0 { 0 } else { on });
         let header = DatagramHeader { kind: kind & 7, board: 1, sequence, base, session: 1, stride, line, flags, span: 0 };
-        let mut datagram = vec![];
-        header.write(body, &mut datagram);
-        datagrams.push(datagram);
+        datagrams.push(header.datagram(body));
     }
     let mut first = None;
     for set in Instructions::ALL.into_iter().filter(|set| set.present()) {

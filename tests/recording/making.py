@@ -62,7 +62,7 @@ def record(
         writer.marker(at + t * 1000, t, start)
     writer.note(at + 5_000_000, 5000, "left heel")
     writer.note(at + 6_000_000, None, "somebody coughed")
-    writer.detection(at + 7_000_000, "contact", 6000, 6192, 1.5, False)
+    writer.detection(at + 7_000_000, ("contact", 6000, 6192, 1.5, False))
     writer.registers(at, json.dumps(_core.registers_preset("5.2 kHz")))
     writer.preview(at, 0, np.full(4096, 75, np.uint16))
     pressed = np.full(4096, 75, np.uint16)

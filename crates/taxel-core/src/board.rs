@@ -41,14 +41,14 @@ pub use crossed::Crossed;
 pub use flaws::{Flaw, Flawed, Flaws};
 pub use link::{DATAGRAM_WORDS, PORT, QUEUE_WORDS};
 pub use network::{Network, NetworkCounts, NetworkFaults};
-pub use options::{IntensityWord, Previous, Version2};
+pub use options::{BoardOptions, IntensityWord, Previous, Version2};
 pub use pattern::pattern;
 pub use play::{Armed, Play, Played};
 pub use session::{opening, session};
 
 use crate::wire::v2::Settings;
 use crate::wire::{CommandReader, Registers};
-use crate::{Array, Result, problem};
+use crate::{Array, Result};
 
 /// The board: registers, previous values, time and queue.
 ///
@@ -69,9 +69,7 @@ use crate::{Array, Result, problem};
 #[derive(Debug, Clone)]
 pub struct Board {
     array: Array,
-    previous: Previous,
-    intensity: IntensityWord,
-    version_2: Version2,
+    options: BoardOptions,
     /// Number of the session, drawn at reset, and the version of the wire after a reset.
     session: u16,
     first_version: u8,
@@ -87,8 +85,8 @@ pub struct Board {
     afferents: BoardAfferents,
     /// The ball whose values take the place of the comparators' with `pattern`.
     ball: Ball,
-    /// The taxels' own comparators, if the board does not scan.
-    asynchronous: Option<Asynchronous>,
+    /// The taxels' own comparators, for a board that does not scan.
+    asynchronous: Asynchronous,
     link: Link,
     refresh: Refresh,
     counts: BoardCounts,
@@ -107,15 +105,23 @@ impl Board {
     ///
     /// `Device` if the registers break a rule; `Problem` if the array has more positions than version 2 can name.
     pub fn new(registers: Registers, array: &Array) -> Result<Self> {
+        Self::with_options(registers, array, BoardOptions::default())
+    }
+
+    /// A board after reset, with the given registers and options.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Board::new`]; `Problem` if the taxels are asynchronous and the registers hold version 1 of the wire, whose
+    /// stamps are of 100 us, or `mechanoreceptor`, or the board compares with the last sample.
+    pub fn with_options(registers: Registers, array: &Array, options: BoardOptions) -> Result<Self> {
         registers.check(array)?;
-        let (version_2, intensity) = (Version2::default(), IntensityWord::default());
-        let settings = version_2.settings(&registers, intensity, version_2.seed);
+        options.check(&registers)?;
+        let session = options.version_2.seed;
         Ok(Self {
             array: array.clone(),
-            previous: Previous::default(),
-            intensity,
-            version_2,
-            session: version_2.seed,
+            options,
+            session,
             first_version: registers.wire_version,
             written: registers,
             active: registers,
@@ -125,25 +131,14 @@ impl Board {
             comparators: Comparators::new(array.len(), array.columns),
             afferents: BoardAfferents::new(array.len()),
             ball: Ball::default(),
-            asynchronous: None,
-            link: Link::new(settings, array)?,
+            asynchronous: Asynchronous::default(),
+            link: Link::new(options.settings(&registers, session), array, options.queue)?,
             refresh: Refresh::default(),
             counts: BoardCounts::default(),
             at_reset: BoardCounts::default(),
             markers_dropped: 0,
             reported: [0; 3],
         })
-    }
-
-    /// Sets the options of version 2.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Board::new`], for the same array.
-    pub fn version_2(mut self, version_2: Version2) -> Result<Self> {
-        (self.version_2, self.session) = (version_2, version_2.seed);
-        self.link.reset(self.settings(), &self.array)?;
-        Ok(self)
     }
 
     /// Resets the board: registers as the logic resets them, with the version of the wire that it had at first; values,
@@ -164,71 +159,18 @@ impl Board {
         self.comparators.values.fill(0);
         self.afferents.forget();
         self.ball = Ball::default();
-        self.asynchronous = self.asynchronous.take().map(|_| Asynchronous::default());
+        self.asynchronous = Asynchronous::default();
         self.link.reset(self.settings(), &self.array)
     }
 
     /// The settings that all datagrams of version 2 share at present.
     fn settings(&self) -> Settings {
-        let frame_sync = self.active.frame_sync && self.asynchronous.is_none();
-        self.version_2.settings(&Registers { frame_sync, ..self.active }, self.intensity, self.session)
-    }
-
-    /// Sets the reference with which a new value is compared.
-    #[must_use]
-    pub fn previous(mut self, previous: Previous) -> Self {
-        self.previous = previous;
-        self
-    }
-
-    /// Sets the content of an intensity word.
-    #[must_use]
-    pub fn intensity(mut self, intensity: IntensityWord) -> Self {
-        self.intensity = intensity;
-        self.link.follow(self.settings());
-        self
-    }
-
-    /// Lets each taxel compare its value with that of its last event by itself: no scan, and stamps of 1 us (thesis
-    /// 4.5,
-    /// Table 7.1).
-    ///
-    /// Each step of `noise_floor + 1` ticks is an event, at the time at which the taxel's value reaches it. A taxel is
-    /// read once per frame, at the time of its line, and its value is interpolated linearly between two readings, so
-    /// events are sent a frame after they happened. At reset the reading of each taxel is sent. The order of lines has
-    /// no effect. If `mechanoreceptor` is set later, lines are scanned while it is set.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` if the registers hold version 1 of the wire, whose stamps are of 100 us, or `mechanoreceptor`, or the
-    /// board compares with the last sample.
-    pub fn asynchronous(mut self) -> Result<Self> {
-        if self.written.wire_version != 2 {
-            return Err(problem!("asynchronous"; ": wire_version is 1: must be 2, whose stamps count 1 us"));
-        }
-        if self.written.mechanoreceptor {
-            return Err(problem!(
-                "asynchronous"; ": mechanoreceptor is set: must not be set, because afferents are scanned"
-            ));
-        }
-        if self.previous == Previous::LastSample {
-            return Err(problem!("asynchronous"; ": previous is last_sample: must be last_sent"));
-        }
-        self.asynchronous = Some(Asynchronous::default());
-        self.link.reset(self.settings(), &self.array)?;
-        Ok(self)
+        self.options.settings(&self.active, self.session)
     }
 
     /// Whether taxels compare their values by themselves.
     fn is_asynchronous(&self) -> bool {
-        self.asynchronous.is_some() && !self.active.mechanoreceptor
-    }
-
-    /// Sets the capacity of the queue, in words; below 2 no event can be sent.
-    #[must_use]
-    pub fn queue(mut self, words: usize) -> Self {
-        self.link.bound(words);
-        self
+        self.options.asynchronous && !self.active.mechanoreceptor
     }
 
     /// The registers as written; the scan applies them from the next frame on.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
-use taxel_core::board::{Board, Network, NetworkFaults, Version2};
+use taxel_core::board::{Board, BoardOptions, Network, NetworkFaults, Version2};
 use taxel_core::wire::v2::{self, DatagramHeader, DatagramOutcome};
 use taxel_core::wire::{self, Decoder, Registers, WORD_BYTES, Word};
 use taxel_core::{Array, Events};
@@ -25,7 +25,8 @@ fn sent(random: &mut StdRng, registers: Registers, frames: u32) -> (Vec<Vec<u8>>
         hold_us: [0, 1000][random.random_range(0..2)],
         ..Version2::default()
     };
-    let mut board = Board::new(registers, &array).unwrap().version_2(how).unwrap();
+    let mut board =
+        Board::with_options(registers, &array, BoardOptions { version_2: how, ..BoardOptions::default() }).unwrap();
     let (mut ticks, mut datagrams) = (vec![40_u16; 4096], vec![]);
     for frame in 0..frames {
         for _ in 0..random.random_range(0..30) {

@@ -3,7 +3,7 @@
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
-use taxel_core::board::{Board, Version2};
+use taxel_core::board::{Board, BoardOptions, Version2};
 use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::wire::{Decoder, Registers, SenderDecoder, StepBack};
 use taxel_core::{Array, Events};
@@ -14,7 +14,9 @@ const FRAME_US: i64 = 192;
 fn life(random: &mut StdRng, version: u8, session: u16, frames: i64) -> Vec<(i64, Vec<u8>)> {
     let how = Version2 { seed: session, states_us: [0, 30_000][random.random_range(0..2)], ..Version2::default() };
     let registers = Registers { wire_version: version, ..Registers::default() };
-    let mut board = Board::new(registers, &Array::thesis()).unwrap().version_2(how).unwrap();
+    let mut board =
+        Board::with_options(registers, &Array::thesis(), BoardOptions { version_2: how, ..BoardOptions::default() })
+            .unwrap();
     let (mut ticks, mut sent) = (vec![40_u16; 4096], vec![]);
     for frame in 0..frames {
         if random.random_range(0..4) == 0 {

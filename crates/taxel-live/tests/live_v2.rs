@@ -8,7 +8,7 @@ use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use taxel_core::board::{Board, Version2};
+use taxel_core::board::{Board, BoardOptions, Version2};
 use taxel_core::detect::{Readout, TrainedNeuron};
 use taxel_core::encode::Encoder;
 use taxel_core::neuron::{Neuron, Time};
@@ -48,8 +48,8 @@ fn options(array: &Array, registers: Registers, record: Option<&Scratch>) -> Liv
 /// The datagrams of frames in which a square comes and goes.
 fn datagrams(array: &Array, registers: Registers, frames: u16) -> Vec<Vec<u8>> {
     let version_2 = Version2 { states_us: 20_000, ..Version2::default() };
-    let mut board =
-        Board::new(registers, array).expect("sound registers").version_2(version_2).expect("the same array");
+    let options = BoardOptions { version_2, ..BoardOptions::default() };
+    let mut board = Board::with_options(registers, array, options).expect("sound registers");
     let mut sent = vec![];
     for k in 0..frames {
         // Above the floor of every preset, so that each taxel is sent once.

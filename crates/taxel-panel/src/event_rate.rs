@@ -26,7 +26,6 @@ impl EventRate {
         let first = *self.first.get_or_insert(t);
         self.step = self.step.max(COLUMN_US);
         loop {
-            #[allow(clippy::cast_possible_truncation)]
             let bin = (t.saturating_sub(first).max(0) / self.step).unsigned_abs() as usize;
             if bin < BINS {
                 if bin >= self.bins.len() {

@@ -96,7 +96,6 @@ fn changes(events: EventsView<'_>) -> Vec<TaxelChange> {
     let change = |k: usize| TaxelChange {
         t: events.t[k],
         // A sensor has 2^22 taxels at most (the limits of recordings).
-        #[allow(clippy::cast_possible_truncation)]
         taxel: (usize::from(events.y[k]) * columns + usize::from(events.x[k])) as u32,
         ticks: events
             .intensity

@@ -65,7 +65,6 @@ impl<'a> SteppedFrames<'a> {
         let change = |(cell, &ticks): (usize, &u16)| {
             let held = before.map_or(UNKNOWN, |before| before[cell]);
             // A sensor has 2^22 taxels at most (the limits of recordings).
-            #[allow(clippy::cast_possible_truncation)]
             let taxel = self.taxels[cell] as u32;
             (TaxelChange { t, taxel, ticks, up: ticks >= held, repaired: false }, held != ticks)
         };
@@ -91,7 +90,6 @@ fn base(values: &[f32], cell: usize, cells: usize, steps: ValueSteps) -> u16 {
 }
 
 /// The rest of a source's cells in steps, each from the frame of this number on: once where it is fixed, else where it moved.
-#[allow(clippy::cast_possible_truncation)]
 fn rests(given: &FrameSource<'_>, steps: ValueSteps) -> Vec<(usize, Vec<u16>)> {
     let FrameRest { source, values, ticks_by_unit, falls, .. } = &given.about.rest;
     let fixed = || vec![(0, values.iter().map(|&value| steps.of_rest(value)).collect())];
@@ -138,7 +136,6 @@ impl Index {
     ) -> Result<Self> {
         let steps = ValueSteps::fitting(sources.iter().map(|source| source.values), array.len());
         // Of several sources, the most.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let floor = sources.iter().map(|source| (source.about.rest.loaded_from / steps.size) as u16).max().unwrap_or(0);
         let step = |source| SteppedFrames::new(source, steps, array.columns);
         let sources: Vec<SteppedFrames<'_>> = sources.into_iter().map(step).collect();

@@ -224,7 +224,6 @@ impl LiveSource {
     }
 
     /// The `counters` message, with rates since the last call; a frame takes `frame_us` where that is known.
-    #[allow(clippy::cast_precision_loss)]
     pub fn counters(&self, frame_us: Option<f64>) -> Value {
         let now = self.handle.counters();
         let before = lock(&self.counted).replace((Instant::now(), now.clone()));

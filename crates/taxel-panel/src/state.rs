@@ -139,7 +139,6 @@ impl RecentChanges {
         for _ in 0..passed {
             for size in &mut self.sizes {
                 // Towards 0, so that 1 becomes 0.
-                #[allow(clippy::cast_possible_truncation)]
                 {
                     *size = (i16::from(*size) * 15 / 16) as i8;
                 }
@@ -324,7 +323,6 @@ impl ArrayState {
         let before = self.held.set(taxel, change.ticks);
         // The first value of a taxel is not a change.
         let moved = if before == UNKNOWN { 0 } else { i32::from(change.ticks) - i32::from(before) };
-        #[allow(clippy::cast_possible_truncation)]
         self.recent.note(taxel, moved.clamp(-127, 127) as i8);
         self.begin_rest(taxel, change.ticks);
         self.change_above_rest(taxel, above, self.above(taxel));
@@ -368,7 +366,6 @@ impl ArrayState {
         let mut changed = false;
         for (taxel, rest) in tracked.rests().enumerate() {
             // The rest follows values of 16 bits.
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             if let Some(rest) = rest {
                 changed |= self.rest.values.track(taxel, rest.round() as u16);
             }

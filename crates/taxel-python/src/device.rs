@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
 use serde_json::{Value, json};
 use taxel_core::wire::StatusLine;
 use taxel_live::line_place::LinePlace;
@@ -71,11 +70,11 @@ impl SerialLine {
     }
 
     /// What has arrived, after at most so many seconds.
-    fn read<'py>(&self, py: Python<'py>, within: f64) -> PyResult<Bound<'py, PyBytes>> {
+    fn read(&self, py: Python<'_>, within: f64) -> PyResult<Vec<u8>> {
         let mut bytes = vec![0; 1 << 16];
         let n = self.line.with(py, |line| line.read(&mut bytes, seconds(within)));
-        let n = n.map_err(|error| live(Error::socket(&self.name)(error)))?;
-        Ok(PyBytes::new(py, &bytes[..n]))
+        bytes.truncate(n.map_err(|error| live(Error::socket(&self.name)(error)))?);
+        Ok(bytes)
     }
 
     /// Writes as many bytes as there is room for; returns their number.

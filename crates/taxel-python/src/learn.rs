@@ -97,7 +97,7 @@ impl ConeRProblem {
                 let Round { round, rows, objective, left: Left::Gap(gap) } = round else { return };
                 caller.call(progress.as_ref(), |py, function| function.call1(py, (round, rows, objective, gap)));
             };
-            self.0.fit(&parameters, silent, start, &mut report, stop)
+            self.0.fit(&parameters, silent, start, None, &mut report, stop)
         })?;
         Ok(fit_out(py, fit, raised))
     }
@@ -158,20 +158,18 @@ fn to_windows(silence: &Option<PyReadonlyArray1<'_, f64>>) -> PyResult<Option<Ve
 type StartIn<'py> = (PyReadonlyArray1<'py, f64>, Option<MultipliersIn<'py>>);
 
 fn to_start<'a>((weights, multipliers): &'a StartIn<'_>) -> PyResult<(&'a [f64], Option<Shares>)> {
-    let multipliers = match multipliers {
-        Some((rows, shares)) => Some(Shares {
-            rows: slice("start", rows)?.iter().map(|&row| usize::try_from(row).unwrap_or(usize::MAX)).collect(),
-            values: slice("start", shares)?.to_vec(),
-        }),
-        None => None,
-    };
+    let multipliers = multipliers.as_ref().map(|(rows, shares)| -> PyResult<Shares> {
+        let rows = slice("start", rows)?.iter().map(|&row| usize::try_from(row).unwrap_or(usize::MAX));
+        Ok(rows.zip(slice("start", shares)?.iter().copied()).collect())
+    });
+    let multipliers = multipliers.transpose()?;
     Ok((slice("start", weights)?, multipliers))
 }
 
 fn fit_out(py: Python<'_>, found: ConeRFit, raised: Option<Py<PyAny>>) -> ConeRFitOut {
     let ConeRFit { fit, rows, multipliers, proof, unreachable, refires, fired } = found;
     let Fit { status, weights, objective, parts, gap, rounds } = fit;
-    let numbers = multipliers.rows.iter().map(|&row| row as i64).collect();
+    let (numbers, shares) = multipliers.into_iter().map(|(row, share)| (row as i64, share)).unzip();
     ConeRFitOut {
         weights: column(py, weights),
         objective,
@@ -183,7 +181,7 @@ fn fit_out(py: Python<'_>, found: ConeRFit, raised: Option<Py<PyAny>>) -> ConeRF
         unreachable,
         refires,
         fired,
-        multipliers: (column(py, numbers), column(py, multipliers.values)),
+        multipliers: (column(py, numbers), column(py, shares)),
         proof: proof_out(py, proof),
         raised,
     }

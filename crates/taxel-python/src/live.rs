@@ -191,7 +191,6 @@ impl Live {
     /// have any, all values one after the other, the number of lines; of those that could not be read, of bytes in no line and
     /// of unfinished lines; the lines that were not read with their arrival, why reading fails now, and the time before which
     /// all that arrived was read.
-    #[allow(clippy::too_many_arguments)]
     fn lines(
         &self,
         py: Python<'_>,

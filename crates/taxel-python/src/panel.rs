@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
 use serde_json::{Value, json};
 use taxel_core::Array;
 use taxel_core::rest::Value as _;
@@ -258,8 +257,8 @@ impl PanelView {
     }
 
     /// The next frame, and messages that go with it; None where nothing is new, or another thread works on the view.
-    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Option<(Bound<'py, PyBytes>, Vec<String>)>> {
-        let frame = enter(py, |_| {
+    fn frame(&self, py: Python<'_>) -> PyResult<Option<(Vec<u8>, Vec<String>)>> {
+        enter(py, |_| {
             let mut view = match self.view.try_lock() {
                 Ok(view) => view,
                 Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
@@ -268,8 +267,7 @@ impl PanelView {
             let frame = view.frame();
             self.moves.store(view.moves(), Ordering::Relaxed);
             Ok(frame)
-        })?;
-        Ok(frame.map(|(bytes, texts)| (PyBytes::new(py, &bytes), texts)))
+        })
     }
 
     /// State (following, playing, paused), speed, and time, us.

@@ -256,18 +256,10 @@ impl RecordingWriter {
         self.with(py, |writer| writer.note(at_ns, t_us, text))
     }
 
-    /// Writes that a taxel was zeroed.
-    fn zeroing(
-        &self,
-        py: Python<'_>,
-        at_ns: i64,
-        t_us: i64,
-        x: u16,
-        y: u16,
-        rest: f64,
-        before: Option<f64>,
-    ) -> PyResult<()> {
-        self.with(py, |writer| writer.zeroing(at_ns, &Zeroing { t: t_us, x, y, rest, before }))
+    /// Writes that a taxel was zeroed: t (us), x, y, rest, the rest before.
+    fn zeroing(&self, py: Python<'_>, at_ns: i64, zeroing: (i64, u16, u16, f64, Option<f64>)) -> PyResult<()> {
+        let (t, x, y, rest, before) = zeroing;
+        self.with(py, |writer| writer.zeroing(at_ns, &Zeroing { t, x, y, rest, before }))
     }
 
     /// Writes a start or stop of the board.
@@ -275,19 +267,10 @@ impl RecordingWriter {
         self.with(py, |writer| writer.marker(at_ns, Marker { t: t_us, start }))
     }
 
-    /// Writes a detection.
-    fn detection(
-        &self,
-        py: Python<'_>,
-        at_ns: i64,
-        label: String,
-        t_us: i64,
-        known_us: i64,
-        slope: f64,
-        repaired: bool,
-    ) -> PyResult<()> {
-        let detection = Detection { label, t: t_us, known: known_us, slope, repaired };
-        self.with(py, |writer| writer.detection(at_ns, &detection))
+    /// Writes a detection: label, t and known (us), slope, repaired.
+    fn detection(&self, py: Python<'_>, at_ns: i64, detection: (String, i64, i64, f64, bool)) -> PyResult<()> {
+        let (label, t, known, slope, repaired) = detection;
+        self.with(py, |writer| writer.detection(at_ns, &Detection { label, t, known, slope, repaired }))
     }
 
     /// Writes a reset of the board or a change of its version of the wire, given as JSON.

@@ -5,7 +5,7 @@ use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde::Deserialize;
-use taxel_core::board::{self, Board, Crossed, Flaws, IntensityWord, NetworkFaults, Play, Previous, Version2, opening};
+use taxel_core::board::{self, Board, BoardOptions, Crossed, Flaws, NetworkFaults, Play, opening};
 use taxel_core::circuit::Chain;
 use taxel_core::contact::{Act, Bonded, Contact, Foam, FrameSequence, Motion, Narrow, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
@@ -178,13 +178,10 @@ struct EmulationOptions {
     registers: Registers,
     /// The board arms, is tared for so long, marks a start and at the end a stop; none where it does none of that.
     tare_ms: Option<f64>,
-    previous: Previous,
-    intensity: IntensityWord,
-    version_2: Version2,
+    board: BoardOptions,
     control: Option<String>,
     faults: Option<NetworkFaults>,
     circuit: Option<Chain>,
-    asynchronous: bool,
     flaws: Option<Flaws>,
     reset_every_s: Option<f64>,
     drift_ppm: f64,
@@ -229,7 +226,7 @@ pub fn emulate(
 ) -> PyResult<Plain<Report>> {
     let array = felt.0;
     let chosen: EmulationOptions = parsed("options", options)?;
-    let EmulationOptions { registers, tare_ms, version_2, previous, intensity, .. } = chosen;
+    let EmulationOptions { registers, tare_ms, board, .. } = chosen;
     let (frame_us, step) = (registers.frame_us(), u16::from(registers.noise_floor) + 1);
     let sensor = to_sensor(sensor)?;
     if let (TouchIn::Acts(_), Some(circuit)) = (&touch, &chosen.circuit) {
@@ -250,10 +247,7 @@ pub fn emulate(
         }
     };
     enter_with_progress(py, |stop, caller| {
-        let mut board = Board::new(registers, &array)?.previous(previous).intensity(intensity).version_2(version_2)?;
-        if chosen.asynchronous {
-            board = board.asynchronous()?;
-        }
+        let board = Board::with_options(registers, &array, board)?;
         let options = EmulatorOptions {
             control: chosen.control.as_deref().map(of_text).transpose()?,
             commands: tare_ms.map_or(Ok(vec![]), |tare_ms| opening(&registers, tare_ms))?,
@@ -329,11 +323,8 @@ impl Layer {
     }
 
     /// Forgets the latest touches.
-    fn forget(&self, py: Python<'_>) -> PyResult<()> {
-        self.0.enter(py, |layer, _| {
-            layer.forget();
-            Ok::<_, Error>(())
-        })
+    fn forget(&self, py: Python<'_>) {
+        self.0.with(py, Bonded::forget);
     }
 }
 

@@ -18,7 +18,6 @@ pub fn test_hook(py: Python<'_>, hook: &str) -> PyResult<()> {
         "device" => Error::device("register: raised by a test hook"),
         "scene" => Error::scene("ball: raised by a test hook"),
         "interrupted" => Error::Interrupted,
-        #[allow(clippy::panic)]
         "panic" => return enter(py, |_| -> Result<(), Error> { panic!("raised by a test hook") }),
         "wait" => {
             return enter(py, |stop| {

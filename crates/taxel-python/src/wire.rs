@@ -4,10 +4,9 @@ use std::borrow::Cow;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use taxel_core::board::{Board, BoardCounts, Crossed, IntensityWord, Previous, Version2};
+use taxel_core::board::{Board, BoardCounts, BoardOptions, Crossed};
 use taxel_core::circuit::Chain;
 use taxel_core::wire::v2::{self, DatagramOutcome};
 use taxel_core::wire::{self, Command, CutDatagrams, Decoder, Registers};
@@ -167,16 +166,15 @@ pub fn wire_cut<'py>(py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResul
 
 /// Events as bytes.
 #[pyfunction]
-pub fn wire_encode<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
+pub fn wire_encode(py: Python<'_>, events: EventsIn<'_>) -> PyResult<Vec<u8>> {
     let events = events.view()?;
-    let bytes = enter(py, |_| wire::encode(events))?;
-    Ok(PyBytes::new(py, &bytes))
+    enter(py, |_| wire::encode(events))
 }
 
 /// A command's five bytes.
 #[pyfunction]
-pub fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound<'_, PyBytes>> {
-    Ok(PyBytes::new(py, &Command::new(register, value).map_err(core)?.to_bytes()))
+pub fn command_bytes(register: u8, value: u32) -> PyResult<[u8; 5]> {
+    Ok(Command::new(register, value).map_err(core)?.to_bytes())
 }
 
 /// Register and value of a command's five bytes.
@@ -283,12 +281,8 @@ pub fn registers_commands(source: &str, target: &str, array: ArrayIn) -> PyResul
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WireBoardOptions {
-    previous: Previous,
-    intensity: IntensityWord,
-    queue: usize,
-    version_2: Version2,
+    board: BoardOptions,
     circuit: Option<Chain>,
-    asynchronous: bool,
 }
 
 /// The emulated board, and the circuit through which it reads.
@@ -301,13 +295,8 @@ impl WireBoard {
     #[new]
     fn new(registers: &str, array: ArrayIn, options: &str) -> PyResult<Self> {
         let (registers, array): (Registers, _) = (parsed("registers", registers)?, array.0);
-        let WireBoardOptions { previous, intensity, queue, version_2, circuit, asynchronous } =
-            parsed("options", options)?;
-        let mut board = Board::new(registers, &array).map_err(core)?;
-        board = board.previous(previous).intensity(intensity).queue(queue).version_2(version_2).map_err(core)?;
-        if asynchronous {
-            board = board.asynchronous().map_err(core)?;
-        }
+        let WireBoardOptions { board, circuit } = parsed("options", options)?;
+        let board = Board::with_options(registers, &array, board).map_err(core)?;
         let crossed = circuit.map(|chain| Crossed::new(chain, &registers, &array)).transpose().map_err(core)?;
         Ok(Self(Exclusive::new((board, crossed))))
     }
@@ -344,16 +333,16 @@ impl WireBoard {
     }
 
     /// Scans one frame; returns the datagrams, of which the sink takes at most so many.
-    fn frame<'py>(
+    fn frame(
         &self,
-        py: Python<'py>,
-        ticks: PyReadonlyArray1<'py, u16>,
+        py: Python<'_>,
+        ticks: PyReadonlyArray1<'_, u16>,
         most: usize,
-        accepted: Option<PyReadonlyArray1<'py, bool>>,
-    ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+        accepted: Option<PyReadonlyArray1<'_, bool>>,
+    ) -> PyResult<Vec<Vec<u8>>> {
         let (ticks, mut sent) = (slice("ticks", &ticks)?, vec![]);
         let accepted = accepted.as_ref().map(|accepted| slice("accepted", accepted)).transpose()?;
-        let datagrams = self.0.enter(py, |(board, crossed), _| {
+        self.0.enter(py, |(board, crossed), _| {
             let mut ticks = Cow::from(ticks);
             // The board refuses a frame of another length.
             if let Some(crossed) = crossed
@@ -369,8 +358,7 @@ impl WireBoard {
                 room
             })?;
             Ok::<_, Error>(sent)
-        })?;
-        Ok(datagrams.iter().map(|d| PyBytes::new(py, d)).collect())
+        })
     }
 
     fn counts(&self, py: Python<'_>) -> Plain<BoardCounts> {

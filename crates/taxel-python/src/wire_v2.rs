@@ -2,7 +2,6 @@
 
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
 use taxel_core::Error;
 use taxel_core::wire::v2::{self, StreamReader};
 
@@ -74,23 +73,21 @@ impl DatagramStream {
     }
 
     /// Takes bytes; returns the datagrams that they complete.
-    fn push<'py>(&self, py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+    fn push(&self, py: Python<'_>, data: PyReadonlyArray1<'_, u8>) -> PyResult<Vec<Vec<u8>>> {
         let (bytes, mut found) = (slice("data", &data)?, vec![]);
-        let found = self.0.enter(py, |reader, _| {
+        self.0.enter(py, |reader, _| {
             reader.push(bytes, |datagram| found.push(datagram.to_vec()));
             Ok::<_, Error>(found)
-        })?;
-        Ok(found.iter().map(|datagram| PyBytes::new(py, datagram)).collect())
+        })
     }
 
     /// Ends the stream; returns the datagrams within what waited for more.
-    fn finish<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+    fn finish(&self, py: Python<'_>) -> PyResult<Vec<Vec<u8>>> {
         let mut found = vec![];
-        let found = self.0.enter(py, |reader, _| {
+        self.0.enter(py, |reader, _| {
             reader.finish(|datagram| found.push(datagram.to_vec()));
             Ok::<_, Error>(found)
-        })?;
-        Ok(found.iter().map(|datagram| PyBytes::new(py, datagram)).collect())
+        })
     }
 
     /// Bytes that belonged to no datagram.

@@ -19,7 +19,7 @@ from taxel.array import Array
 from taxel.simulate.circuit import Circuit
 from taxel.wire import Registers
 
-__all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "pattern", "reading"]
+__all__ = ["NOT_RETURNED", "Board", "Version2", "board_options", "fitting", "lines_of", "pattern"]
 
 #: The trip time of a comparator that had not returned when the ramp began: a fault, not a value.
 NOT_RETURNED = 65_535
@@ -77,8 +77,18 @@ class Version2:
             integer(field.name, getattr(self, field.name), field.metadata["min"], field.metadata["max"])
 
 
-def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
-    """Return how taxels are read, as the compiled part expects it.
+def board_options(previous: str, intensity: str, version_2: Version2 | None, asynchronous: bool) -> dict[str, Any]:
+    """Return the options of a board as the compiled part expects them."""
+    return {
+        "previous": text("previous", previous, ("last_sent", "last_sample")),
+        "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
+        "version_2": asdict(instance("version_2", Version2() if version_2 is None else version_2, Version2)),
+        "asynchronous": flag("asynchronous", asynchronous),
+    }
+
+
+def lines_of(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any] | None:
+    """Return the lines through which taxels are read, as the compiled part expects them.
 
     Raises
     ------
@@ -87,7 +97,7 @@ def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
     lines = None if circuit is None else instance("circuit", circuit, Circuit)._plain()
     if flag("asynchronous", asynchronous) and lines is not None:
         raise refused("asynchronous", ": must be left out if circuit is given, because these taxels share no lines")
-    return {"circuit": lines, "asynchronous": asynchronous}
+    return lines
 
 
 def fitting(preset: str | None, array: Array) -> Registers:
@@ -211,13 +221,9 @@ class Board:
     ) -> None:
         self.array = Array._of(array)
         start = Registers(array=self.array) if registers is None else instance("registers", registers, Registers)
-        options = {
-            "previous": text("previous", previous, ("last_sent", "last_sample")),
-            "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
-            "queue": integer("queue", queue, 0, 2**32),
-            "version_2": asdict(instance("version_2", Version2() if version_2 is None else version_2, Version2)),
-            **reading(circuit, asynchronous),
-        }
+        board = board_options(previous, intensity, version_2, asynchronous)
+        board["queue"] = integer("queue", queue, 0, 2**32)
+        options = {"board": board, "circuit": lines_of(circuit, asynchronous)}
         self._core = _core.WireBoard(start._json(), self.array, json.dumps(options))
 
     def frame(self, ticks: ArrayLike, *, most: int | None = None, accepted: ArrayLike | None = None) -> list[bytes]:

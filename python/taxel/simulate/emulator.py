@@ -16,7 +16,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.simulate.acts import Act, Contact, FrameSequence, Scene, Silence
-from taxel.simulate.board import fitting, reading
+from taxel.simulate.board import fitting, lines_of
 from taxel.simulate.circuit import Circuit
 from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.options import EmulateOptions
@@ -143,7 +143,7 @@ def play(
         integer("seed", seed, 0),
         parts,
         number("tare_ms", tare_ms),
-        parameters(reading(circuit, asynchronous)),
+        parameters({"circuit": lines_of(circuit, asynchronous), "asynchronous": asynchronous}),
         callback("watch", watch),
     )
     _warn(acts, played.narrow)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import KW_ONLY, asdict, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ from taxel._base.arguments import instance, integer, number, text
 from taxel._base.options import option
 from taxel.array import Array
 from taxel.simulate.acts import Act, Contact
-from taxel.simulate.board import Version2, fitting, reading
+from taxel.simulate.board import Version2, board_options, fitting, lines_of
 from taxel.simulate.circuit import Circuit
 from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.replay import Replay
@@ -89,13 +89,9 @@ class EmulateOptions:
         return {
             "registers": registers._held,
             "tare_ms": None if isinstance(self.touch, Replay) else number("tare_ms", self.tare_ms),
-            "previous": text("previous", self.previous, ("last_sent", "last_sample")),
-            "intensity": text("intensity", self.intensity, ("value", "difference", "nothing")),
-            "version_2": asdict(
-                instance("version_2", Version2() if self.version_2 is None else self.version_2, Version2)
-            ),
+            "board": board_options(self.previous, self.intensity, self.version_2, self.asynchronous),
             "control": None if self.control is None else text("control", self.control),
-            **reading(self.circuit, self.asynchronous),
+            "circuit": lines_of(self.circuit, self.asynchronous),
             "flaws": None if self.flaws is None else instance("flaws", self.flaws, Flaws)._parts(),
             "faults": None if self.faults is None else instance("faults", self.faults, Faults)._parts(),
             "reset_every_s": None if self.reset_every_s is None else number("reset_every_s", self.reset_every_s),

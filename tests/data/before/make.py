@@ -64,12 +64,12 @@ def written() -> None:
     writer.note(BEGAN + 50_000_000, 50_000, "heel")
     writer.note(BEGAN + 200_000_000, 200_000, "toe")
     writer.note(BEGAN + 1, None, "cough")
-    writer.zeroing(BEGAN + 60_000_000, 60_000, 2, 3, 40.0, None)
-    writer.zeroing(BEGAN + 220_000_000, 220_000, 7, 1, 41.5, 39.0)
+    writer.zeroing(BEGAN + 60_000_000, (60_000, 2, 3, 40.0, None))
+    writer.zeroing(BEGAN + 220_000_000, (220_000, 7, 1, 41.5, 39.0))
     changed = Registers(array=array, lines=10, line_period=6.0)
     writer.registers(BEGAN + 150_000_000, changed._json())
-    writer.detection(BEGAN + 100_000_000, "contact", 99_000, 100_000, 1.5, False)
-    writer.detection(BEGAN + 240_000_000, "lift", 239_000, 240_000, float("nan"), True)
+    writer.detection(BEGAN + 100_000_000, ("contact", 99_000, 100_000, 1.5, False))
+    writer.detection(BEGAN + 240_000_000, ("lift", 239_000, 240_000, float("nan"), True))
     writer.finish(json.dumps({"received": len(times), "dropped_by_kernel": 2}))
 
 

@@ -65,7 +65,7 @@ impl Board {
                 }
             }
         }
-        if self.previous == Previous::LastSample && !registers.mechanoreceptor {
+        if self.options.previous == Previous::LastSample && !registers.mechanoreceptor {
             self.comparators.sample(ticks, &registers);
         }
         self.time += registers.frame_10ns();
@@ -84,7 +84,7 @@ impl Board {
         }
         if self.active.mechanoreceptor != self.written.mechanoreceptor {
             self.afferents.forget();
-            self.asynchronous = self.asynchronous.take().map(|_| Asynchronous::default());
+            self.asynchronous = Asynchronous::default();
         }
         self.active = self.written;
         let now = self.now();
@@ -130,7 +130,7 @@ impl Board {
         let (p, intensity) = if registers.mechanoreceptor {
             self.afferents.spike(taxel)
         } else {
-            match self.intensity {
+            match self.options.intensity {
                 IntensityWord::Value | IntensityWord::Nothing => (value >= before, value),
                 IntensityWord::Difference => (value >= before, value.abs_diff(before)),
             }
@@ -142,7 +142,7 @@ impl Board {
 
     /// Finds the crossings of taxels that compare by themselves, and queues those before this frame.
     fn queue_crossings(&mut self, any: bool, read: FrameReading<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
-        let Some(mut asynchronous) = self.asynchronous.take() else { return };
+        let mut asynchronous = std::mem::take(&mut self.asynchronous);
         let (registers, columns, new) = (self.active, usize::from(self.array.columns), asynchronous.is_new());
         let ticks = read.ticks;
         if any {
@@ -161,11 +161,11 @@ impl Board {
         let now =
             ticks.iter().zip(&self.comparators.values).map(|(&t, &value)| if t == NOT_RETURNED { value } else { t });
         let due = asynchronous.end_frame(self.time, now.map(|t| t.min(registers.ramp)));
-        self.asynchronous = Some(asynchronous);
+        self.asynchronous = asynchronous;
         // At reset, the events of all taxels are in the first frame itself.
         debug_assert!(!new || due.is_empty());
         for TaxelCrossing { at, x, y, p, value, moved } in due {
-            let intensity = if self.intensity == IntensityWord::Difference { moved } else { value };
+            let intensity = if self.options.intensity == IntensityWord::Difference { moved } else { value };
             self.enqueue(ScannedEvent { at, x, y, p, intensity }, read, sink);
         }
     }
@@ -183,7 +183,7 @@ impl Board {
             self.link.offer(&mut self.counts, sink);
             return packed;
         }
-        let valued = self.active.mechanoreceptor || self.intensity != IntensityWord::Nothing;
+        let valued = self.active.mechanoreceptor || self.options.intensity != IntensityWord::Nothing;
         let queued = self.link.words(found, valued, &mut self.counts);
         self.link.offer(&mut self.counts, sink);
         queued
@@ -192,7 +192,7 @@ impl Board {
     /// Sends what is due at the end of a frame: all words of version 1; for version 2 events, promises, states and
     /// totals.
     fn end_frame(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
-        let period = self.version_2.states_us * 100;
+        let period = self.options.version_2.states_us * 100;
         if period > 0 {
             self.refresh.frame(&self.active, period);
         }
@@ -216,7 +216,7 @@ impl Board {
 
     /// Sends the values of a driven line again as states, with the comparators' reference values.
     fn repeat(&mut self, x: u16, now: u64) {
-        if self.active.mechanoreceptor || self.intensity == IntensityWord::Nothing {
+        if self.active.mechanoreceptor || self.options.intensity == IntensityWord::Nothing {
             return;
         }
         let Self { link, array, comparators, .. } = self;

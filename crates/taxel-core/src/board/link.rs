@@ -46,10 +46,10 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// An empty queue of [`QUEUE_WORDS`].
-    pub(super) fn new(settings: Settings, array: &Array) -> Result<Self> {
+    /// An empty queue of so many words.
+    pub(super) fn new(settings: Settings, array: &Array, capacity: usize) -> Result<Self> {
         let packer = Packer::new(settings, array)?;
-        Ok(Self { capacity: QUEUE_WORDS, filling: vec![], packer, waiting: VecDeque::new(), waiting_words: 0 })
+        Ok(Self { capacity, filling: vec![], packer, waiting: VecDeque::new(), waiting_words: 0 })
     }
 
     /// Starts a session: the current datagrams are discarded, whole datagrams in the queue are still sent.
@@ -57,11 +57,6 @@ impl Link {
         self.filling.clear();
         self.packer = Packer::new(settings, array)?;
         Ok(())
-    }
-
-    /// Sets the capacity of the queue, in words.
-    pub(super) fn bound(&mut self, words: usize) {
-        self.capacity = words;
     }
 
     /// Continues with other settings of version 2; no event of version 2 may be waiting.

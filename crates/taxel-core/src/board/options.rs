@@ -1,9 +1,12 @@
-//! A user's options of a board besides its registers: the reference of a change, the content of an event, version 2.
+//! A user's options of a board besides its registers: the reference of a change, the content of an event, version 2, the
+//! queue, and whether it scans.
 
 use serde::{Deserialize, Serialize};
 
+use super::link::QUEUE_WORDS;
 use crate::wire::Registers;
 use crate::wire::v2::{BodyKind, Settings};
+use crate::{Result, problem};
 
 /// The reference with which a new value is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -51,9 +54,53 @@ impl Default for Version2 {
     }
 }
 
-impl Version2 {
+/// The options of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BoardOptions {
+    /// The reference with which a new value is compared.
+    pub previous: Previous,
+    /// The content of an intensity word.
+    pub intensity: IntensityWord,
+    /// The options of version 2.
+    pub version_2: Version2,
+    /// The capacity of the queue, in words; below 2 no event can be sent.
+    pub queue: usize,
+    /// Whether each taxel compares its value with that of its last event by itself: no scan, and stamps of 1 us (thesis 4.5,
+    /// Table 7.1).
+    ///
+    /// Each step of `noise_floor + 1` ticks is an event, at the time at which the taxel's value reaches it. A taxel is
+    /// read once per frame, at the time of its line, and its value is interpolated linearly between two readings, so
+    /// events are sent a frame after they happened. At reset the reading of each taxel is sent. The order of lines has
+    /// no effect. If `mechanoreceptor` is set later, lines are scanned while it is set.
+    pub asynchronous: bool,
+}
+
+impl Default for BoardOptions {
+    fn default() -> Self {
+        let (previous, intensity, version_2) = (Previous::LastSent, IntensityWord::Value, Version2::default());
+        Self { previous, intensity, version_2, queue: QUEUE_WORDS, asynchronous: false }
+    }
+}
+
+impl BoardOptions {
+    /// Checks that a board with these registers can do without a scan, if it shall.
+    pub(super) fn check(&self, registers: &Registers) -> Result<()> {
+        let fault = match registers {
+            _ if !self.asynchronous => return Ok(()),
+            Registers { wire_version: 1, .. } => "wire_version is 1: must be 2, whose stamps count 1 us",
+            Registers { mechanoreceptor: true, .. } => {
+                "mechanoreceptor is set: must not be set, because afferents are scanned"
+            }
+            _ if self.previous == Previous::LastSample => "previous is last_sample: must be last_sent",
+            _ => return Ok(()),
+        };
+        Err(problem!("asynchronous"; ": {fault}"))
+    }
+
     /// The settings that the datagrams of a session share, on a board with these registers.
-    pub(super) fn settings(&self, registers: &Registers, intensity: IntensityWord, session: u16) -> Settings {
+    pub(super) fn settings(&self, registers: &Registers, session: u16) -> Settings {
+        let Self { intensity, version_2: Version2 { board, hold_us, heartbeat_us, .. }, .. } = *self;
         let kind = if registers.mechanoreceptor {
             BodyKind::Large
         } else if intensity == IntensityWord::Nothing {
@@ -64,13 +111,13 @@ impl Version2 {
             BodyKind::Large
         };
         Settings {
-            board: self.board,
+            board,
             session,
             kind,
-            frame_sync: registers.frame_sync,
+            frame_sync: registers.frame_sync && !self.asynchronous,
             differences: !registers.mechanoreceptor && intensity == IntensityWord::Difference,
-            hold_us: self.hold_us,
-            heartbeat_us: self.heartbeat_us,
+            hold_us,
+            heartbeat_us,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Plays acts to a board that arms, is tared, starts and stops.
 
-use super::{Board, Crossed, session};
+use super::{Board, BoardOptions, Crossed, session};
 use crate::circuit::Chain;
 use crate::contact::{Act, Narrow, Sensor, Stage, Taxels};
 use crate::wire::{Command, Decoder, Registers, SenderDecoder, WORD_BYTES};
@@ -72,15 +72,13 @@ impl Play {
     ///
     /// # Errors
     ///
-    /// As [`Play::stage`], [`Board::new`], [`Board::asynchronous`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` if
+    /// As [`Play::stage`], [`Board::with_options`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` if
     /// the tare leaves no frame for the acts.
     pub fn arm(&self, stop: Stop<'_>) -> Result<Armed> {
         let mut stage = self.stage(stop)?;
         let commands = session(&self.registers, self.tare_ms, stage.frames() as u64)?;
-        let mut board = Board::new(self.registers, &self.array)?;
-        if self.asynchronous {
-            board = board.asynchronous()?;
-        }
+        let options = BoardOptions { asynchronous: self.asynchronous, ..BoardOptions::default() };
+        let mut board = Board::with_options(self.registers, &self.array, options)?;
         let mut crossed = None;
         if let Some(chain) = &self.circuit {
             Crossed::fits(chain, &self.sensor)?;

@@ -60,9 +60,7 @@ impl Board {
     pub fn arm(&mut self, ticks: &[u16]) -> Result<()> {
         let before = self.counts;
         self.frame(ticks, |_| true)?;
-        if let Some(asynchronous) = &mut self.asynchronous {
-            asynchronous.clear();
-        }
+        self.asynchronous.clear();
         let BoardCounts { frames, not_returned, .. } = self.counts;
         self.counts = BoardCounts { frames, not_returned, ..before };
         Ok(())

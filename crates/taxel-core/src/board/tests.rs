@@ -6,7 +6,11 @@ use crate::wire::{Command, Registers, WORD_BYTES, Word, decode};
 use crate::{Array, Error};
 
 fn board() -> Board {
-    Board::new(Registers::default(), &Array::thesis()).unwrap()
+    board_with(BoardOptions::default())
+}
+
+fn board_with(options: BoardOptions) -> Board {
+    Board::with_options(Registers::default(), &Array::thesis(), options).unwrap()
 }
 
 fn play(board: &mut Board, ticks: &[u16]) -> Vec<Vec<u8>> {
@@ -63,12 +67,12 @@ fn a_slow_rise_is_sent_with_the_last_value_sent_and_never_with_the_last_sample()
         (0..20_u16).map(|frame| play(&mut board, &[frame; 4096]).concat().len() / 10).sum()
     };
     assert_eq!(sent(board()), 4 * 4096);
-    assert_eq!(sent(board().previous(Previous::LastSample)), 0);
+    assert_eq!(sent(board_with(BoardOptions { previous: Previous::LastSample, ..BoardOptions::default() })), 0);
 }
 
 #[test]
 fn differences_carry_their_sign_in_the_polarity() {
-    let mut board = board().intensity(IntensityWord::Difference);
+    let mut board = board_with(BoardOptions { intensity: IntensityWord::Difference, ..BoardOptions::default() });
     let mut ticks = vec![0; 4096];
     for (value, difference, p) in [(50, 50, true), (20, 30, false)] {
         ticks[0] = value;
@@ -129,7 +133,7 @@ fn the_random_order_is_drawn_line_by_line() {
 
 #[test]
 fn totals_count_since_reset_and_markers_among_what_was_dropped() {
-    let mut board = board().queue(1000);
+    let mut board = board_with(BoardOptions { queue: 1000, ..BoardOptions::default() });
     let nine = Command { register: 6, value: 9 }.to_bytes();
     let mut ticks = [100; 4096];
     ticks[9] = NOT_RETURNED;
@@ -146,7 +150,7 @@ fn totals_count_since_reset_and_markers_among_what_was_dropped() {
 
 #[test]
 fn fault_counts_begin_at_0_at_each_reset() {
-    let mut board = board().queue(1000);
+    let mut board = board_with(BoardOptions { queue: 1000, ..BoardOptions::default() });
     let mut ticks = [100; 4096];
     ticks[9] = NOT_RETURNED;
     board.frame(&ticks, |_| false).unwrap();
@@ -165,7 +169,9 @@ fn fault_counts_begin_at_0_at_each_reset() {
 fn the_first_datagram_begun_after_a_loss_carries_the_flag() {
     let registers = Registers { wire_version: 2, ..Registers::default() };
     let version_2 = Version2 { hold_us: 500, ..Version2::default() };
-    let mut board = Board::new(registers, &Array::thesis()).unwrap().version_2(version_2).unwrap();
+    let mut board =
+        Board::with_options(registers, &Array::thesis(), BoardOptions { version_2, ..BoardOptions::default() })
+            .unwrap();
     let (mut ticks, mut flags) = ([0; 4096], vec![]);
     ticks[9] = 100;
     for frame in 0..4 {
@@ -198,7 +204,7 @@ fn only_events_of_accepted_taxels_find_room() {
 
 #[test]
 fn a_full_queue_drops_both_words_of_a_taxel_and_counts_them() {
-    let mut board = board().queue(1000);
+    let mut board = board_with(BoardOptions { queue: 1000, ..BoardOptions::default() });
     board.frame(&[100; 4096], |_| false).unwrap();
     assert_eq!((board.counts().words, board.counts().dropped), (1000, 4096 - 500));
     let later = play(&mut board, &[100; 4096]);

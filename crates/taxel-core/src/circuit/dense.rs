@@ -73,7 +73,7 @@ fn subtract_rows(mut row: Lanes, factors: &[f64], others: &[Lanes]) -> Lanes {
 
 wide! {
     /// `out - left right`, in place; `left` row by row.
-    fn subtract(out: &mut Matrix, left: &[f64], right: &Matrix) {
+    pub(super) fn subtract(out: &mut Matrix, left: &[f64], right: &Matrix) {
         let (rows, inner) = (out.rows.max(1), right.rows.max(1));
         for (out, right) in out.lanes.chunks_exact_mut(rows).zip(right.lanes.chunks_exact(inner)) {
             for (row, factors) in out.iter_mut().zip(left.chunks_exact(inner)) {
@@ -115,8 +115,9 @@ wide! {
 }
 
 wide! {
-    /// Solves `U'U x = right` in place.
-    fn substitute(upper: &Matrix, lower: &[f64], inverse: &[f64], right: &mut Matrix) {
+    /// Solves `U'U x = right` in place, for all columns.
+    pub(super) fn solve(factored: &FactoredMatrix, right: &mut Matrix) {
+        let FactoredMatrix { upper, lower, inverse } = factored;
         let n = upper.rows.max(1);
         let mut factors = vec![0.0; n];
         for right in right.lanes.chunks_exact_mut(n) {
@@ -142,11 +143,6 @@ wide! {
 }
 
 impl Matrix {
-    /// Subtracts from it the product of a matrix stored row by row and another one.
-    pub(super) fn subtract(&mut self, left: &[f64], right: &Matrix) {
-        subtract(self, left, right);
-    }
-
     /// Factors it: it must be symmetric, with as many columns as rows.
     ///
     /// # Errors
@@ -158,14 +154,9 @@ impl Matrix {
         if eliminate(&mut self, &mut lower, &mut inverse) {
             Ok(FactoredMatrix { upper: self, lower, inverse })
         } else {
-            Err(too_far_apart())
+            Err(problem!("the network's conductances differ too much for a solution in float64"))
         }
     }
-}
-
-/// Why a network was not solved.
-fn too_far_apart() -> crate::Error {
-    problem!("the network's conductances differ too much for a solution in float64")
 }
 
 /// A matrix, factored.
@@ -174,13 +165,6 @@ pub(super) struct FactoredMatrix {
     upper: Matrix,
     lower: Vec<f64>,
     inverse: Vec<f64>,
-}
-
-impl FactoredMatrix {
-    /// Solves for all columns of a right-hand side, in place.
-    pub(super) fn solve(&self, right: &mut Matrix) {
-        substitute(&self.upper, &self.lower, &self.inverse, right);
-    }
 }
 
 #[cfg(test)]
@@ -204,8 +188,8 @@ mod tests {
                 (0..columns).for_each(|k| *x.at_mut(i, k) = value(i + 3, k));
             }
             let mut left = x.clone();
-            matrix.factor().unwrap().solve(&mut x);
-            left.subtract(&full, &x);
+            solve(&matrix.factor().unwrap(), &mut x);
+            subtract(&mut left, &full, &x);
             let worst = (0..n * columns).map(|at| left.at(at / columns, at % columns).abs()).fold(0.0, f64::max);
             assert!(worst < 1e-12, "{n} x {columns}: {worst:e}");
         }

@@ -11,7 +11,7 @@
 //! That is symmetric, positive definite and as large as there are rows; ideal lines (0 ohm) are no special case, and
 //! small currents are no differences of large ones.
 
-use super::dense::Matrix;
+use super::dense::{Matrix, solve, subtract};
 use crate::{Result, problem};
 
 /// A network's lines; driven lines that are not read are held at one voltage.
@@ -78,11 +78,11 @@ impl Crossbar {
         }
         if self.sense_ohm > 0.0 {
             let mut matrix = Matrix::zeros(n, n);
-            matrix.subtract(&g, &turned);
+            subtract(&mut matrix, &g, &turned);
             (0..n).for_each(|i| *matrix.at_mut(i, i) += by_row[i]);
             let mut matrix = matrix.scaled(self.sense_ohm);
             (0..n).for_each(|i| *matrix.at_mut(i, i) += 1.0);
-            matrix.factor()?.solve(&mut solved);
+            solve(&matrix.factor()?, &mut solved);
         }
         let mut currents = vec![0.0; n * m];
         for (i, row) in currents.chunks_exact_mut(m.max(1)).enumerate() {

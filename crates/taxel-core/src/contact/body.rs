@@ -75,17 +75,14 @@ fn rolling() -> f64 {
     0.03
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_sliding(value: &f64) -> bool {
     *value == sliding()
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_rolling(value: &f64) -> bool {
     *value == rolling()
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_at_once(value: &f64) -> bool {
     *value == 0.0
 }

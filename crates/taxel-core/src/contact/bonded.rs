@@ -22,7 +22,7 @@ pub use cell::Cell;
 use descent::{Descent, Plane};
 use plan::CellPlane;
 pub use plan::{check_cells, most_cells};
-use spread::PressureSpread;
+use spread::{PressureSpread, spread_pressure};
 use sweep::{Influence, Sweep};
 
 /// More cells than these, times those along a pitch, are solved by waves: a sweep costs their square, a convolution the
@@ -311,7 +311,7 @@ impl Bonded {
                 PressureSpread { table: &self.spread, per_pitch: n, reach: self.reach, margin, array: self.array };
             for (cell, pressure) in cells.iter().zip(pressure) {
                 if *pressure > 0.0 {
-                    spread.add(out, *cell, *pressure as f32);
+                    spread_pressure(spread, out, *cell, *pressure as f32);
                 }
             }
             return Ok(());

@@ -45,7 +45,6 @@ fn one_cell() -> u16 {
     1
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_one(value: &u16) -> bool {
     *value == 1
 }

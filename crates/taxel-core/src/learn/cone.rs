@@ -7,6 +7,5 @@ mod exact;
 mod mix;
 mod shortest;
 
-pub(crate) use cone_r::PatternDemand;
 pub use cone_r::{ConeR, ConeRFit, ConeRProblem, GapMultipliers, Shares};
 pub use cone_x::{ConeX, ConeXFit, ConeXProblem};

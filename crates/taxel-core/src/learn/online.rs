@@ -5,9 +5,9 @@
 //! scratch.
 
 use crate::allowed::{Parameter, Range};
-use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, PatternDemand, Shares};
+use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, Shares};
 use crate::learn::fit::Round;
-use crate::learn::statement::{check_example, check_silence};
+use crate::learn::statement::{check_example, check_silence, check_trains};
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -73,14 +73,15 @@ impl OnlineConeR {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.added, pattern, targets)?;
         check_silence(self.added, silence)?;
-        let end = parameters.end_of(self.added, pattern, targets)?;
         if self.added == 0 {
             self.problem = ConeRProblem::without_patterns(parameters, pattern.len());
         }
         let problem = &mut self.problem;
+        if let Some(first) = problem.patterns.first() {
+            check_trains(self.added, pattern, first.len())?;
+        }
         let [_, before] = problem.rows_by_kind();
-        problem.check_trains(self.added, pattern)?;
-        problem.push(pattern, PatternDemand { targets, silence, end }, stop)?;
+        problem.push((self.added, pattern), targets, silence, stop)?;
         let mut gone = [0; 3];
         if self.added >= self.window {
             [gone, _] = problem.rows_by_kind();
@@ -88,7 +89,7 @@ impl OnlineConeR {
         }
         if let Some((_, shares)) = &mut self.last {
             let [_, after] = problem.rows_by_kind();
-            shares.renumber(before, gone, after);
+            renumber(shares, before, gone, after);
         }
         self.added += 1;
         Ok(())
@@ -105,26 +106,20 @@ impl OnlineConeR {
         }
         let problem = &self.problem;
         let start = self.last.as_ref().map(|(weights, shares)| (weights.as_slice(), Some(shares)));
-        let fit = problem.fit_counting(&self.parameters, &[], start, Some(problem.patterns() - 1), progress, stop)?;
+        let fit = problem.fit(&self.parameters, &[], start, Some(problem.patterns.len() - 1), progress, stop)?;
         self.last = Some((fit.fit.weights.clone(), fit.multipliers.clone()));
         Ok(fit)
     }
 }
 
-impl Shares {
-    /// Removes the entries of the first `gone` rows of each kind, and renumbers the others for `after` rows a kind.
-    fn renumber(&mut self, before: [usize; 3], gone: [usize; 3], after: [usize; 3]) {
-        let mut kept = Self::default();
-        for (&row, &value) in self.rows.iter().zip(&self.values) {
-            let (mut kind, mut place, mut first) = (0, row, 0);
-            while place >= before[kind] {
-                (place, first, kind) = (place - before[kind], first + after[kind], kind + 1);
-            }
-            if place >= gone[kind] {
-                kept.rows.push(first + place - gone[kind]);
-                kept.values.push(value);
-            }
+/// Removes the entries of the first `gone` rows of each kind, and renumbers the others for `after` rows a kind.
+fn renumber(shares: &mut Shares, before: [usize; 3], gone: [usize; 3], after: [usize; 3]) {
+    shares.retain_mut(|(row, _)| {
+        let (mut kind, mut place, mut first) = (0, *row, 0);
+        while place >= before[kind] {
+            (place, first, kind) = (place - before[kind], first + after[kind], kind + 1);
         }
-        *self = kept;
-    }
+        *row = (first + place).saturating_sub(gone[kind]);
+        place >= gone[kind]
+    });
 }

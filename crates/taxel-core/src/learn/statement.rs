@@ -25,9 +25,8 @@ pub use examples::{check_examples, check_pattern, check_some_target, check_train
 pub(crate) use objective::{Choice, Objective, relative_gap};
 pub use objective::{Divisor, DivisorC, DivisorD, FormB, Norm, Parts, Sides};
 pub(crate) use peak::{SilencePeak, exceeds, largest};
-pub(crate) use program::{Point, Program, Proof, Rows, Tangents};
+pub(crate) use program::{Point, Program, Proof, Rows};
 pub(crate) use relaxed::Relaxed;
-pub(crate) use rows::end_of;
 pub use rows::{Margin, Row, StatedRow, Statement};
 pub(crate) use silence::Silence;
 pub(crate) use targets::Targets;

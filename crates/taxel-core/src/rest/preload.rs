@@ -47,7 +47,6 @@ pub fn preload_text(preload: &[f64], columns: usize, corner: (usize, usize)) -> 
     let down = span("row", &mut loaded().map(|k| corner.0 + k / columns));
     let across = span("column", &mut loaded().map(|k| corner.1 + k % columns));
     // Three digits that count.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let digits = (2.0 - most.log10().floor()).clamp(0.0, 12.0) as usize;
     format!("{down}, {across} (up to {} above rest)", format!("{most:.digits$}").parse().unwrap_or(most))
 }

@@ -57,14 +57,12 @@ impl RestStretch {
         self.first[taxel] = value;
     }
 
-    #[allow(clippy::cast_precision_loss)]
     fn mean(&self, taxel: usize) -> f64 {
         f64::from(self.first[taxel]) + f64::from(self.sums[taxel] / self.samples as f32)
     }
 
     /// The median of the taxels' standard deviations on a grid, where a touch moves few of them; 0 for channels, each of
     /// which a load may move. A taxel without a value so far did not move.
-    #[allow(clippy::cast_precision_loss)]
     fn noise(&self, grid: TaxelGrid) -> f64 {
         let n = self.samples as f32;
         let variance = |(sum, squares): (&f32, &f32)| (squares - sum * sum / n).max(0.0) / n;
@@ -151,7 +149,6 @@ impl TrackedRest {
         let far = stands_out_from(FAR_NOISE, 0.0, noise_floor);
         let known: Vec<bool> = begins.iter().map(|&rest| rest != f64::NO_REST).collect();
         let rest = begins.into_iter().map(|rest| if rest == f64::NO_REST { 0.0 } else { rest }).collect();
-        #[allow(clippy::cast_possible_truncation)]
         let mut baseline = Baseline::tracked(rest, vec![far as f32; n]);
         (0..n).filter(|&taxel| known[taxel]).for_each(|taxel| baseline.freeze(taxel));
         let rest_given = known.contains(&true);
@@ -162,7 +159,6 @@ impl TrackedRest {
     }
 
     /// Reads the next values, at `t` us, NaN for a taxel without one; returns them above the rest (negative below it).
-    #[allow(clippy::cast_possible_truncation)]
     pub fn take(&mut self, t: i64, values: impl IntoIterator<Item = f32>) -> &[f32] {
         for (taxel, value) in values.into_iter().enumerate().take(self.known.len()) {
             if value.is_nan() {
@@ -196,7 +192,6 @@ impl TrackedRest {
     }
 
     /// Ends the stretch at `t`: a quiet one sets rests.
-    #[allow(clippy::cast_possible_truncation)]
     fn end_stretch(&mut self, t: i64) {
         let next = RestStretch::new(t, &self.values);
         let Some(stretch) = self.stretch.replace(next) else { return };

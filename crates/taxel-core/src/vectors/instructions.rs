@@ -148,10 +148,10 @@ macro_rules! by_width {
 macro_rules! wide {
     (
         $(#[$about:meta])*
-        fn $name:ident $(<$rule:ident: $bound:ident>)? ($($argument:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block
+        $visible:vis fn $name:ident $(<$rule:ident: $bound:ident>)? ($($argument:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block
     ) => {
         $(#[$about])*
-        fn $name $(<$rule: $bound>)? ($($argument: $kind),*) $(-> $out)? {
+        $visible fn $name $(<$rule: $bound>)? ($($argument: $kind),*) $(-> $out)? {
             #[inline(always)]
             fn plain $(<$rule: $bound>)? ($($argument: $kind),*) $(-> $out)? $body
             $crate::vectors::by_width!(

@@ -292,9 +292,7 @@ mod tests {
                 flags: 0,
                 span: 1,
             };
-            let mut datagram = vec![];
-            header.write(&[], &mut datagram);
-            let until = decoder.push(&datagram, Some(arrived), &mut events).until.unwrap();
+            let until = decoder.push(&header.datagram(&[]), Some(arrived), &mut events).until.unwrap();
             assert!((before..=before + 400 * 86_400_000_000).contains(&until), "{until} us after {before} us");
             before = until;
         }

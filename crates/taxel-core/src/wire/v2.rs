@@ -268,9 +268,10 @@ impl DatagramHeader {
         }
     }
 
-    /// Appends a datagram with this header and body.
-    pub fn write(&self, body: &[u8], out: &mut Vec<u8>) {
-        out.clear();
+    /// The datagram with this header and body.
+    #[must_use]
+    pub fn datagram(&self, body: &[u8]) -> Vec<u8> {
+        let mut out = Vec::with_capacity(HEADER_BYTES + body.len() + TRAILER_BYTES);
         out.extend([MAGIC, 2 << 4 | self.kind & 0xf]);
         out.extend(self.board.to_le_bytes());
         out.extend(self.sequence.to_le_bytes());
@@ -280,8 +281,8 @@ impl DatagramHeader {
         out.extend([self.line << STRIDE_BITS | stride, self.line >> LOW_LINE_BITS << FLAG_BITS | flags]);
         out.extend(body);
         out.extend(self.span.to_le_bytes());
-        let sum = crc32c::crc32c(out);
-        out.extend(sum.to_le_bytes());
+        out.extend(crc32c::crc32c(&out).to_le_bytes());
+        out
     }
 }
 
@@ -355,8 +356,7 @@ mod tests {
             flags: 5,
             span: 192,
         };
-        let mut bytes = vec![];
-        header.write(&[1, 2, 3, 4], &mut bytes);
+        let bytes = header.datagram(&[1, 2, 3, 4]);
         assert_eq!(DatagramHeader::read(&bytes), Ok((header, &[1, 2, 3, 4][..])));
         for bit in 0..8 * bytes.len() {
             let mut flipped = bytes.clone();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
-use taxel_core::board::{Board, IntensityWord, Version2};
+use taxel_core::board::{Board, BoardOptions, IntensityWord, Version2};
 use taxel_core::wire::Registers;
 use taxel_core::wire::v2::{DatagramHeader, DatagramOutcome, Decoder};
 use taxel_core::{Array, Events};
@@ -90,7 +90,9 @@ fn repeated_states_repair_the_values_after_a_loss() {
     let registers = Registers { wire_version: 2, lines: 16, noise_floor: 0, ..Registers::default() };
     for intensity in [IntensityWord::Value, IntensityWord::Difference] {
         let version_2 = Version2 { states_us: 20_000, ..Version2::default() };
-        let mut board = Board::new(registers, &array).unwrap().intensity(intensity).version_2(version_2).unwrap();
+        let mut board =
+            Board::with_options(registers, &array, BoardOptions { intensity, version_2, ..BoardOptions::default() })
+                .unwrap();
         let mut decoder = Decoder::new(array.clone());
         let mut events = Events::empty(array.clone());
         let mut frames = scene(&mut random, &array, 200, 150);
@@ -129,11 +131,9 @@ fn totals_of_a_stranger_may_be_any_number() {
     let mut decoder = Decoder::new(Array::thesis());
     let mut events = Events::empty(Array::thesis());
     for session in 0..3 {
-        let mut datagram = vec![];
         let header =
             DatagramHeader { kind: 4, board: 0, sequence: 0, base: 0, session, stride: 6, line: 0, flags: 0, span: 0 };
-        header.write(&[0xff; 40], &mut datagram);
-        decoder.push(&datagram, None, &mut events);
+        decoder.push(&header.datagram(&[0xff; 40]), None, &mut events);
     }
     assert_eq!(decoder.counts().events_dropped, u64::MAX);
 }
@@ -172,12 +172,10 @@ fn time_goes_on_after_a_reset_which_is_counted() {
 fn a_number_drawn_twice_is_a_reset_once() {
     let mut decoder = Decoder::new(Array::thesis());
     let mut events = Events::empty(Array::thesis());
-    let mut datagram = Vec::new();
     let mut hear = |sequence, base| {
         let header =
             DatagramHeader { kind: 1, board: 1, sequence, base, session: 9, stride: 6, line: 0, flags: 0, span: 192 };
-        header.write(&[0x05, 0x80], &mut datagram);
-        decoder.push(&datagram, None, &mut events)
+        decoder.push(&header.datagram(&[0x05, 0x80]), None, &mut events)
     };
     let intact = |heard| matches!(heard, DatagramOutcome::Intact { .. });
     assert!(intact(hear(70_000, 20_000_000)));
@@ -210,9 +208,7 @@ fn what_another_board_sent_under_the_same_number_is_refused_by_every_set_of_inst
                 flags: 0,
                 span: 192,
             };
-            let mut datagram = vec![];
-            header.write(&[random.random_range(0..4), 0x80], &mut datagram);
-            datagram
+            header.datagram(&[random.random_range(0..4), 0x80])
         };
         let (mut numbers, mut came) = ([7, random.random_range(0..200)], vec![]);
         for _ in 0..2000 {
@@ -245,7 +241,6 @@ fn unknown_kinds_and_flags_are_counted_and_anything_is_survived() {
     let array = Array::new(100, 100, 1.0, "any").unwrap();
     let mut decoder = Decoder::new(array.clone());
     let mut events = Events::empty(array.clone());
-    let mut bytes = vec![];
     for sequence in 0..20_000_u32 {
         let body: Vec<u8> = (0..random.random_range(0..80)).map(|_| random.random()).collect();
         let header = DatagramHeader {
@@ -259,8 +254,7 @@ fn unknown_kinds_and_flags_are_counted_and_anything_is_survived() {
             flags: random.random(),
             span: random.random(),
         };
-        header.write(&body, &mut bytes);
-        decoder.push(&bytes, Some(random.random_range(i64::MIN / 4..i64::MAX / 4)), &mut events);
+        decoder.push(&header.datagram(&body), Some(random.random_range(i64::MIN / 4..i64::MAX / 4)), &mut events);
         events.view().check().unwrap();
         events.clear();
     }

@@ -24,9 +24,7 @@ fn every_set_of_instructions_decodes_the_same() {
                 let line = if random.random_bool(0.5) { 0 } else { random.random() };
                 let header =
                     DatagramHeader { kind, board: 1, sequence, base: time, session: 1, stride, line, flags, span: 192 };
-                let mut datagram = vec![];
-                header.write(&words(&mut random, kind), &mut datagram);
-                datagram
+                header.datagram(&words(&mut random, kind))
             })
             .collect();
         let datagrams = if seed % 2 == 0 { datagrams } else { as_a_network(&mut random, &datagrams) };

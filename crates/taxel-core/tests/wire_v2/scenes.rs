@@ -1,7 +1,7 @@
 //! Random scenes, boards and datagrams for the tests of version 2, and the rows of events.
 
 use rand::{Rng, rngs::StdRng};
-use taxel_core::board::{Board, IntensityWord, Version2};
+use taxel_core::board::{Board, BoardOptions, IntensityWord, Version2};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Events};
 
@@ -44,12 +44,10 @@ pub(crate) fn board(random: &mut StdRng, array: &Array, hold_us: u64) -> Board {
     registers.frame_sync = random.random();
     registers.noise_floor = random.random_range(0..6);
     let words = [IntensityWord::Value, IntensityWord::Difference, IntensityWord::Nothing];
-    Board::new(registers, array)
-        .unwrap()
-        .intensity(words[random.random_range(0..3)])
-        .queue(usize::MAX)
-        .version_2(Version2 { board: 7, seed: random.random(), hold_us, states_us: 0, ..Version2::default() })
-        .unwrap()
+    let intensity = words[random.random_range(0..3)];
+    let version_2 = Version2 { board: 7, seed: random.random(), hold_us, states_us: 0, ..Version2::default() };
+    let options = BoardOptions { intensity, version_2, queue: usize::MAX, ..BoardOptions::default() };
+    Board::with_options(registers, array, options).unwrap()
 }
 
 pub(crate) type Row = (i64, u16, u16, bool, u16);

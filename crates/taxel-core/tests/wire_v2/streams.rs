@@ -26,8 +26,7 @@ fn a_stream_is_cut_anywhere_and_found_again_after_damage() {
                 flags: 0,
                 span: 0,
             };
-            let mut bytes = vec![];
-            header.write(&body, &mut bytes);
+            let bytes = header.datagram(&body);
             let mut framed = [&(bytes.len() as u16).to_le_bytes()[..], &bytes].concat();
             match random.random_range(0..6) {
                 0 => {
@@ -142,9 +141,7 @@ fn a_stream_in_one_call_gives_what_its_datagrams_give_one_by_one() {
                 } else {
                     1
                 });
-                let mut datagram = vec![];
-                header.write(&body, &mut datagram);
-                datagram
+                header.datagram(&body)
             })
             .collect();
         let datagrams = if seed % 2 == 0 { datagrams } else { as_a_network(&mut random, &datagrams) };

@@ -27,7 +27,6 @@ impl Coordinates {
         Self { places, scale: (!array.is_channels()).then_some(((0.0, 0.0), 1.0)) }
     }
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn of_places(array: &Array, Places { x, y, .. }: &Places) -> Self {
         let range = |all: &[f64]| {
             let there = all.iter().enumerate().filter(|&(taxel, _)| array.has(taxel)).map(|(_, &place)| place);
@@ -49,7 +48,6 @@ impl Coordinates {
     }
 
     /// The centre of loads that sum up to this, and times their coordinates to these; NaN without any load.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
     pub(crate) fn centre(&self, sum: u64, sum_x: u64, sum_y: u64) -> (f32, f32) {
         let Some(((left, top), step)) = self.scale.filter(|_| sum > 0) else { return (f32::NAN, f32::NAN) };
         let at = |from: f64, moment: u64| (from + step * (moment as f64 / sum as f64)) as f32;

@@ -26,7 +26,6 @@ struct Uneven {
 impl Weights {
     /// The weights of values in this unit, and the force that 1 in the sum of values is (N): of pressures where the area
     /// of each taxel is known, else `None`.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)]
     pub(crate) fn new(array: &Array, unit: &str) -> (Self, Option<f64>) {
         let Some(areas) = array.areas_mm2().filter(|_| unit == "kPa") else { return (Self::default(), None) };
         let there = areas.iter().enumerate().filter(|&(taxel, _)| array.has(taxel)).map(|(_, &area)| area);
@@ -48,7 +47,6 @@ impl Weights {
     }
 
     /// The sum that is shown of the weighted one.
-    #[allow(clippy::cast_possible_truncation)]
     pub(crate) fn sum(&self, weighted: u64) -> u32 {
         let sum = self.0.as_ref().map_or(weighted, |weights| (weighted + weights.divisor / 2) / weights.divisor);
         sum.min(u32::MAX.into()) as u32

@@ -111,7 +111,6 @@ pub(crate) fn write(
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, b"TXF1");
     // The protocol's fields are as wide as the largest array and section need.
-    #[allow(clippy::cast_possible_truncation)]
     {
         put(4, &(HEADER as u16).to_le_bytes());
         put(12, &array.rows.to_le_bytes());

@@ -29,7 +29,6 @@ impl Playback {
 
     /// Board time of now, us, while it is playing.
     pub(super) fn now(&self) -> Option<i64> {
-        #[allow(clippy::cast_possible_truncation)]
         let passed = |since: Instant| (since.elapsed().as_secs_f64() * self.speed * 1e6) as i64;
         self.begun.map(|(since, from)| from.saturating_add(passed(since)))
     }

@@ -503,8 +503,8 @@ def _add_small(writer: Any, source: SourceView, at_ns: Callable[[int], int]) -> 
     for note in source.marks.notes:
         writer.note(note.at_ns, note.t, note.text)
     for zeroing in source.marks.zeroings:
-        writer.zeroing(at_ns(zeroing.t), zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before)
+        writer.zeroing(at_ns(zeroing.t), (zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before))
     for at, values in source.marks.settings:
         writer.registers(at, values._json())
     for d in source.marks.detections:
-        writer.detection(at_ns(d.known), d.label, d.t, d.known, d.slope, d.repaired)
+        writer.detection(at_ns(d.known), (d.label, d.t, d.known, d.slope, d.repaired))

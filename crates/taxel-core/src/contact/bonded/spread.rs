@@ -13,14 +13,9 @@ pub(super) struct PressureSpread<'a> {
     pub array: (usize, usize),
 }
 
-impl PressureSpread<'_> {
-    pub fn add(self, out: &mut [f32], cell: Cell, pressure: f32) {
-        add(self, out, cell, pressure);
-    }
-}
-
 wide! {
-    fn add(spread: PressureSpread<'_>, out: &mut [f32], cell: Cell, pressure: f32) {
+    /// Adds what a cell's pressure gives to each taxel.
+    pub(super) fn spread_pressure(spread: PressureSpread<'_>, out: &mut [f32], cell: Cell, pressure: f32) {
         let ((rows, columns), n) = (spread.array, spread.per_pitch);
         let side = 2 * spread.reach + 1;
         // The cell's taxel, and which of its cells it is. Taxel (x, y) of the array is (x + margin, y + margin); a table's

@@ -63,7 +63,7 @@ impl Sweep {
         }
         for _ in 0..turns {
             stop.check()?;
-            let (moved, largest) = grid.turn(cells, runs, wanted, pressure, pushed);
+            let (moved, largest) = turn(grid, cells, runs, wanted, pressure, pushed);
             if moved <= tolerance * largest {
                 break;
             }
@@ -98,21 +98,10 @@ impl Influence<'_> {
             }
         }
     }
-
-    /// One sweep; how far the pressure moved that moved most, and the largest.
-    fn turn(
-        self,
-        cells: &[Cell],
-        runs: &[CellRun],
-        wanted: &[f64],
-        pressure: &mut [f64],
-        pushed: &mut [f64],
-    ) -> (f64, f64) {
-        turn(self, cells, runs, wanted, pressure, pushed)
-    }
 }
 
 wide! {
+    /// One sweep; how far the pressure moved that moved most, and the largest.
     fn turn(grid: Influence<'_>, cells: &[Cell], runs: &[CellRun], wanted: &[f64], pressure: &mut [f64], pushed: &mut [f64]) -> (f64, f64) {
         let self_influence = grid.table[grid.table.len() / 2];
         let (mut moved, mut largest) = (0.0_f64, 0.0_f64);

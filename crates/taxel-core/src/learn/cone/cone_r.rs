@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::allowed::{Range, one_weight_a_train};
 use crate::learn::engines::WarmStart;
-use crate::learn::fit::{Fit, Left, Round, Status};
+use crate::learn::fit::{Fit, Left, Round};
 use crate::learn::statement::{
     Choice, Divisor, DivisorC, DivisorD, FormB, Margin, Norm, Objective, OneOrEach, Proof, Relaxed, Row, Sides,
-    Statement, bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
+    Statement, bounds_of, check_bounds, check_examples, check_silence,
 };
 use crate::metrics::matching::{WINDOW_MS, match_spikes};
 use crate::neuron::{Neuron, Time};
@@ -83,15 +83,6 @@ impl ConeR {
         self.delta_t_ms.unwrap_or(0.1 * self.neuron.tau)
     }
 
-    /// The end of the silent rows of pattern `p`, ms.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` if a target, or the pattern's start, is after the horizon.
-    pub(crate) fn end_of(&self, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<f64> {
-        end_of(&self.neuron, self.horizon, p, pattern, targets)
-    }
-
     /// These parameters with all potentials in units of `unit` mV.
     fn in_units(&self, unit: f64) -> Self {
         let (lb, ub) = (self.lb.times(1.0 / unit), self.ub.times(1.0 / unit));
@@ -99,17 +90,12 @@ impl ConeR {
     }
 }
 
-/// The multipliers from which a similar fit starts: the nonzero ones, by row (silent rows first, then targets, then B).
+/// The multipliers from which a similar fit starts: the nonzero ones, by row, ascending (silent rows first, then targets,
+/// then B).
 ///
 /// Each is a share of its row's weight in 6.14 (of twice that weight for a C of both sides): from 0 to 1 for a silent
 /// row; for a target from -1/2 to 1/2, from -1 to 0 if C counts only potentials below; likewise for B, if it is a sum.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Shares {
-    /// The numbers of the rows, ascending.
-    pub rows: Vec<usize>,
-    /// The share of each of these rows.
-    pub values: Vec<f64>,
-}
+pub type Shares = Vec<(usize, f64)>;
 
 /// The slopes of the tangents below the terms of 6.14 that prove the gap of a fit: the nonzero ones, 1/mV. In CONE-X
 /// (6.11) the rows are hard, and have multipliers instead of D and C.
@@ -142,24 +128,13 @@ pub struct ConeRFit {
     pub fired: (usize, usize),
 }
 
-/// What is asked of a pattern.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PatternDemand<'a> {
-    /// The times at which the neuron shall fire, ms.
-    pub(crate) targets: &'a [f64],
-    /// The windows in which it shall not, ms; `None`: everywhere else.
-    pub(crate) silence: Option<&'a [[f64; 2]]>,
-    /// The end of its silence, ms.
-    pub(crate) end: f64,
-}
-
 /// The rows of a set of examples, computed once and solved for many `lambdas`, `kappa`, bounds and divisors.
 ///
 /// Internally all potentials are in units of `Neuron::unit` mV.
 #[derive(Debug, Clone)]
 pub struct ConeRProblem {
     base: ConeR,
-    patterns: Vec<SpikeTrains>,
+    pub(crate) patterns: Vec<SpikeTrains>,
     statement: Statement,
     rows: Relaxed,
 }
@@ -188,12 +163,9 @@ impl ConeRProblem {
         for (p, windows) in silence.iter().enumerate() {
             check_silence(p, windows.as_deref())?;
         }
-        let examples = patterns.iter().zip(targets).enumerate();
-        let ends = examples.map(|(p, (pattern, targets))| parameters.end_of(p, pattern, targets));
-        let ends = ends.collect::<Result<Vec<f64>>>()?;
         let mut problem = Self::without_patterns(parameters, patterns[0].len());
-        for (((pattern, targets), silence), end) in patterns.iter().zip(targets).zip(silence).zip(ends) {
-            problem.push(pattern, PatternDemand { targets, silence: silence.as_deref(), end }, stop)?;
+        for ((pattern, targets), silence) in patterns.iter().enumerate().zip(targets).zip(silence) {
+            problem.push(pattern, targets, silence.as_deref(), stop)?;
         }
         Ok(problem)
     }
@@ -206,9 +178,16 @@ impl ConeRProblem {
         Self { rows: Relaxed::new(&statement), base, patterns: vec![], statement }
     }
 
-    /// Adds a pattern, which the caller has checked; if the caller stops it, nothing changes.
-    pub(crate) fn push(&mut self, pattern: &SpikeTrains, asked: PatternDemand<'_>, stop: Stop<'_>) -> Result<()> {
-        self.statement.push(pattern, asked.targets, asked.silence, asked.end, stop)?;
+    /// Adds a pattern, number `p` to the caller, who has checked it, with its targets (ms) and the windows in which
+    /// silence counts (ms; `None`: everywhere); on an error nothing changes.
+    pub(crate) fn push(
+        &mut self,
+        (p, pattern): (usize, &SpikeTrains),
+        targets: &[f64],
+        silence: Option<&[[f64; 2]]>,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        self.statement.push((p, pattern), targets, silence, self.base.horizon, stop)?;
         if let Err(error) = self.rows.push(&self.statement, self.base.delta_t(), stop) {
             self.statement.drop_last();
             return Err(error);
@@ -222,14 +201,6 @@ impl ConeRProblem {
         self.rows.drop_first();
         self.statement.drop_first();
         self.patterns.remove(0);
-    }
-
-    pub(crate) fn check_trains(&self, p: usize, pattern: &SpikeTrains) -> Result<()> {
-        check_trains(p, pattern, self.rows.trains)
-    }
-
-    pub(crate) fn patterns(&self) -> usize {
-        self.patterns.len()
     }
 
     /// The numbers of rows by kind: of the first pattern, and of all.
@@ -255,14 +226,15 @@ impl ConeRProblem {
     /// The objective 6.14 with these parameters, in this problem's units.
     fn objective(&self, parameters: &ConeR, silent: &[f64]) -> Result<Objective> {
         let bounds = bounds_of(&parameters.lb, &parameters.ub, self.rows.trains)?;
-        let ConeR { lambdas, kappa, norm, form_b, .. } = *parameters;
+        let ConeR { lambdas, kappa, norm, form_b, sides_b, sides_c, .. } = *parameters;
         let choice = Choice {
             lambdas,
             kappa,
             norm,
             form_b,
             divisors: (parameters.divide_b_by, parameters.divide_c_by, parameters.divide_d_by),
-            sides: (parameters.sides_b, parameters.sides_c),
+            sides_b,
+            sides_c,
         };
         let d_max = |most: &[f64]| self.rows.most_broken_silence(most);
         let unit = self.statement.unit;
@@ -275,8 +247,8 @@ impl ConeRProblem {
     /// `parameters` may differ from those of the problem in `lambdas`, `kappa`, bounds, divisors, sides, `norm`,
     /// and `tolerance`; the others are part of the rows. `silent` are the largest absolute weights (mV) of
     /// trains without a spike, which were left out of the rows but count in the normalisers. `start` are the weights of
-    /// a similar fit, with its multipliers if that fit had the same rows; a closer start is faster. If a stop is
-    /// requested, `fit` returns the best weights so far.
+    /// a similar fit, with its multipliers if that fit had the same rows; a closer start is faster. The neuron is then run on
+    /// `only` one pattern if it is named. If a stop is requested, `fit` returns the best weights so far.
     ///
     /// # Errors
     ///
@@ -286,19 +258,7 @@ impl ConeRProblem {
         parameters: &ConeR,
         silent: &[f64],
         start: Option<(&[f64], Option<&Shares>)>,
-        progress: &mut dyn FnMut(Round),
-        stop: Stop<'_>,
-    ) -> Result<ConeRFit> {
-        self.fit_counting(parameters, silent, start, None, progress, stop)
-    }
-
-    /// Fits like `fit`; counts refiring on one pattern alone if it is named.
-    pub(crate) fn fit_counting(
-        &self,
-        parameters: &ConeR,
-        silent: &[f64],
-        start: Option<(&[f64], Option<&Shares>)>,
-        pattern: Option<usize>,
+        only: Option<usize>,
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<ConeRFit> {
@@ -310,28 +270,20 @@ impl ConeRProblem {
         let start = self.start_from(&objective, start)?;
         let mut found = self.rows.minimise(&objective, parameters.tolerance, start, progress, stop);
         if self.rows.move_to_limits(&objective, parameters.tolerance, &mut found, stop)? {
-            found.rounds += 1;
-            let (round, left) = (found.rounds, Left::Gap(found.gap));
-            progress(Round { round, rows: found.rows, objective: found.objective, left });
+            found.fit.rounds += 1;
+            let Fit { rounds: round, gap, objective, .. } = found.fit;
+            progress(Round { round, rows: found.rows, objective, left: Left::Gap(gap) });
         }
-        let weights: Vec<f64> = found.weights.iter().map(|w| w * unit).collect();
-        let (refires, fired) = self.firing(&weights, pattern)?;
-        let kept = || found.shares.iter().enumerate().filter(|s| *s.1 != 0.0);
+        found.fit.weights.iter_mut().for_each(|w| *w *= unit);
+        let (refires, fired) = self.firing(&found.fit.weights, only)?;
         Ok(ConeRFit {
             rows: found.rows,
-            multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
+            multipliers: found.shares.into_iter().enumerate().filter(|(_, share)| *share != 0.0).collect(),
             unreachable: self.unreachable(&objective),
             refires,
             fired,
             proof: self.name_rows(found.proof),
-            fit: Fit {
-                status: if found.gap <= parameters.tolerance { Status::Solved } else { Status::Stopped },
-                weights,
-                objective: found.objective,
-                parts: found.parts,
-                gap: found.gap,
-                rounds: found.rounds,
-            },
+            fit: found.fit,
         })
     }
 
@@ -362,7 +314,7 @@ impl ConeRProblem {
         let program = self.rows.program(objective);
         let all = program.rows();
         let mut shares = vec![0.0; all];
-        for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
+        for &(row, share) in multipliers {
             let Some(entry) = shares.get_mut(row) else {
                 return Err(problem!("start"; ": has a multiplier of row {row}, but there are only {all} rows"));
             };

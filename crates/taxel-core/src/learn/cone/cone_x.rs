@@ -14,8 +14,7 @@ use crate::allowed::Range;
 use crate::learn::fit::{Fit, Round, Status};
 use crate::learn::statement::{
     Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, FormB, Margin, Norm, Objective, OneOrEach, Parts, Row,
-    Sides, StatedRow, Statement, bounds_of, check_bounds, check_examples, check_some_target, end_of, largest,
-    relative_gap,
+    Sides, StatedRow, Statement, bounds_of, check_bounds, check_examples, check_some_target, largest, relative_gap,
 };
 use crate::neuron::{Neuron, Time};
 use crate::parameters::parameters;
@@ -182,14 +181,10 @@ impl ConeXProblem {
                 "horizon"; ": {count} values; must be one number for all patterns, or one per pattern, {}", patterns.len()
             ));
         }
-        let examples = || patterns.iter().zip(targets).enumerate();
-        let horizon = |p| parameters.horizon.as_ref().map(|horizon| horizon.at(p));
-        let ends = examples().map(|(p, (pattern, targets))| end_of(neuron, horizon(p), p, pattern, targets));
-        let ends = ends.collect::<Result<Vec<f64>>>()?;
-        stop.check()?;
         let mut statement = Statement::new(neuron, parameters.margin(), unit, trains);
-        for (p, (pattern, targets)) in examples() {
-            statement.push(pattern, targets, None, ends[p], stop)?;
+        for (example, targets) in patterns.iter().enumerate().zip(targets) {
+            let horizon = parameters.horizon.as_ref().map(|horizon| horizon.at(example.0));
+            statement.push(example, targets, None, horizon, stop)?;
         }
         let [l1, l2, b] = parameters.lambdas;
         let choice = Choice {
@@ -198,7 +193,8 @@ impl ConeXProblem {
             norm: parameters.norm,
             form_b: parameters.form_b,
             divisors: (parameters.divide_b_by, DivisorC::default(), DivisorD::default()),
-            sides: (Sides::Both, Sides::Both),
+            sides_b: Sides::Both,
+            sides_c: Sides::Both,
         };
         let objective = |targets: &_| Objective::new(choice, bounds, &[], targets, unit, |_| 0.0);
         let exact = Exact::new(statement, parameters.delta_t(), objective, parameters.tolerance, stop)?;

@@ -28,7 +28,7 @@ pub(super) const MOST_ROUNDS: usize = 1000;
 pub(super) struct Exact {
     pub(super) statement: Statement,
     pub(super) targets: Arc<Targets>,
-    silence: Silence,
+    pub(super) silence: Silence,
     pub(super) objective: Objective,
     /// The relative gap at which the objective counts as minimal.
     pub(super) tolerance: f64,
@@ -72,15 +72,14 @@ impl Exact {
         self.objective.exact_parts(&self.targets, weights)
     }
 
-    /// The largest violation of a target row, mV.
-    pub(super) fn worst_target(&self, weights: &[f64]) -> f64 {
-        let missed = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
-        largest(missed.chain([0.0]))
+    /// The violation of each target row, mV.
+    fn misses(&self, weights: &[f64]) -> impl Iterator<Item = f64> {
+        self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs())
     }
 
-    /// The instants at which silence with this share of the margin is violated by more than `tolerance`.
-    pub(super) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<SilencePeak> {
-        self.silence.broken(weights, share, tolerance)
+    /// The largest violation of a target row, mV.
+    pub(super) fn worst_target(&self, weights: &[f64]) -> f64 {
+        largest(self.misses(weights).chain([0.0]))
     }
 
     /// The worst violation of silence with the share of the margin that a solution must keep, mV; negative if silence
@@ -109,8 +108,8 @@ impl Exact {
                 "pattern {pattern}: at {t} ms, the potential is {excess:.1e} mV too high for silence"
             )));
         }
-        let misses = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
-        let worst = misses.enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
+        let worst =
+            self.misses(weights).enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((k, miss)) = worst.filter(|_| self.is_grid()) {
             let ((pattern, target), t, miss) = (self.targets.names[k], self.targets.times[k], miss * unit);
             return Ok(Some(format!(
@@ -174,7 +173,7 @@ impl Exact {
         // At the worst instants, potential + share * margin = threshold gives the next share; the shares only decrease.
         let mut share = 1.0;
         loop {
-            let broken = self.broken(weights, share, self.rounding(weights));
+            let broken = self.silence.broken(weights, share, self.rounding(weights));
             let less = broken.iter().map(|peak| peak.excess / self.statement.margin_of(peak.row()));
             let next = share - largest(less.chain([0.0]));
             // The weights of a fit that was stopped may keep no margin at all.

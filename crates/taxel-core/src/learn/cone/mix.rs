@@ -48,7 +48,7 @@ impl Exact {
         let nothing = objective.nothing_of_b(&self.targets);
         let theta_0 = self.statement.neuron.theta_0;
         let trains = self.statement.trains;
-        let squares = objective.b > 0.0 && objective.form_b == FormB::Square;
+        let squares = objective.b > 0.0 && objective.choice.form_b == FormB::Square;
         let gram = if squares { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
         let mut rows = Written::new(self, &best, start)?;
         let mut state = Between::at(best.weights.clone(), rows.multipliers());
@@ -83,7 +83,7 @@ impl Exact {
             let meets = if gap <= aim || ended { rows.meet(objective, &self.targets, &point, stop)? } else { None };
             let met = meets.as_ref().unwrap_or(&point.weights);
             let tolerance = if gap > NEAR { NEAR_SHARE * theta_0 } else { self.rounding(met) };
-            let broken = self.broken(met, ASKED_SHARE, tolerance);
+            let broken = self.silence.broken(met, ASKED_SHARE, tolerance);
             let objective_there = self.parts(met).sum();
             let left = Left::Broken(broken.len());
             progress(Round { round: best.rounds, rows: rows.names.len(), objective: objective_there, left });
@@ -268,7 +268,7 @@ impl Written {
         let (mut at, mut wanted) = (targets.at.clone(), targets.thresholds.clone());
         for (k, _) in after.filter(|(_, x)| x.abs() <= AT_LIMIT * worst) {
             at.extend_from_slice(targets.row(k).behind);
-            wanted.push(objective.kappa * targets.thresholds[k]);
+            wanted.push(objective.choice.kappa * targets.thresholds[k]);
         }
         let near = |k: &usize| rows[*k] >= -AT_LIMIT * worst;
         let near: Vec<usize> = (0..self.names.len()).filter(near).collect();

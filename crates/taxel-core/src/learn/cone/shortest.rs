@@ -62,7 +62,7 @@ impl Exact {
                 }
                 // Where rounding leaves some rows undecided, others may refute the problem; `report` checks all.
                 None => {
-                    let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
+                    let broken = self.silence.broken(&weights, ASKED_SHARE, self.rounding(&weights));
                     let rows = working.present.len();
                     let objective = self.parts(&weights).sum();
                     progress(Round { round: rounds, rows, objective, left: Left::Broken(broken.len()) });
@@ -147,7 +147,7 @@ impl Exact {
         let least: Vec<f64> = sum.iter().zip(lower.iter().zip(upper)).map(|(g, (l, u))| (-g).clamp(*l, *u)).collect();
         let square = dot(&least, &least);
         let bound = self.objective.l2_term((2.0 * (0.5 * square + dot(&sum, &least) - allowed)).max(0.0));
-        let factor = match self.objective.norm {
+        let factor = match self.objective.choice.norm {
             Norm::Norm if square > 0.0 => self.objective.l2 / square.sqrt(),
             Norm::Norm => 0.0,
             Norm::Square => 2.0 * self.objective.l2,

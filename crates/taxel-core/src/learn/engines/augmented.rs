@@ -160,9 +160,8 @@ pub(crate) struct Found {
 
 struct Lagrangian<'a> {
     program: &'a Program<'a>,
-    weights: Vec<f64>,
-    excess: Vec<f64>,
-    behind: Vec<f64>,
+    /// Where the weights are now; the terms of the objective are those where the Lagrangian began.
+    at: Point,
     /// One per row, between its slopes.
     multipliers: Vec<f64>,
     /// The multipliers of l1 and of the bounds, one per synapse.
@@ -207,7 +206,7 @@ impl Program<'_> {
         proof.improve(engine.proof_at_zero(&best));
         engine.most = best.parts.sum();
         if started {
-            let candidate = self.point(engine.weights.clone());
+            let candidate = self.point(engine.at.weights.clone());
             proof.improve(engine.proof());
             if candidate.parts.sum() < best.parts.sum() {
                 best = candidate;
@@ -291,7 +290,7 @@ impl Program<'_> {
         let value = point.parts.sum() + missed;
         if solved {
             engine.end_round();
-            let Lagrangian { weights, multipliers, held, .. } = engine;
+            let Lagrangian { at: Point { weights, .. }, multipliers, held, .. } = engine;
             let soft = !self.is_hard() || self.sums() > 0;
             let smoothing = if soft || missed > ENOUGH_MET * accuracy {
                 (SHRINK_WHOLE * state.smoothing).max(SHARPEST_WHOLE)
@@ -302,7 +301,7 @@ impl Program<'_> {
         } else if self.is_hard() {
             state.smoothing *= BLUNTER;
         } else {
-            state.weights = engine.weights;
+            state.weights = engine.at.weights;
             state.smoothing /= SHRINK_WHOLE;
             state.nearness = (state.nearness / FARTHER).min(NEAR_CENTRE);
         }
@@ -337,9 +336,7 @@ impl<'a> Lagrangian<'a> {
         Self {
             program,
             centre: at.weights.clone(),
-            weights: at.weights,
-            excess: at.excess,
-            behind: at.behind,
+            at,
             factors: vec![0.0; multipliers.len()],
             multipliers,
             held: vec![0.0; n],
@@ -370,16 +367,16 @@ impl<'a> Lagrangian<'a> {
     /// The scale of `sigma` and `rho`: the slope of the l1 and l2 terms at a synapse, or a share of the targets' pull,
     /// over the scale of the weights.
     fn size(&mut self, share: f64) -> f64 {
-        let (program, objective, n) = (self.program, self.program.objective, self.weights.len() as f64);
+        let (program, objective, n) = (self.program, self.program.objective, self.at.weights.len() as f64);
         self.slopes();
-        let mut pull = vec![0.0; self.weights.len()];
+        let mut pull = vec![0.0; self.at.weights.len()];
         let silent = program.limit.len();
         for (k, ((row, _), factor)) in program.stored().zip(&self.factors[silent..]).enumerate() {
             let most = [objective.c, objective.b][program.kind(silent + k) - 1];
             add(&mut pull, factor.abs().max(most), row);
         }
-        for target in program.targets.iter().take(self.behind.len()) {
-            add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, target.behind);
+        for target in program.targets.iter().take(self.at.behind.len()) {
+            add(&mut pull, 2.0 * objective.b * objective.choice.kappa * target.threshold, target.behind);
         }
         let most = (dot(&pull, &pull) / n).sqrt();
         (objective.l1 + objective.l2 / n.sqrt()).max(share * most).max(1e-12) / self.width
@@ -417,7 +414,7 @@ impl<'a> Lagrangian<'a> {
     /// Computes the slope of each smoothed row.
     fn slopes(&mut self) {
         let (program, steep) = (self.program, self.steep());
-        let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.multipliers);
+        let rows = self.factors.iter_mut().zip(&self.at.excess).zip(&self.multipliers);
         for (k, ((factor, &x), &multiplier)) in rows.enumerate() {
             let kind = program.kind(k);
             let [low, high] = program.slopes[kind];
@@ -438,17 +435,17 @@ impl<'a> Lagrangian<'a> {
         }
         self.gradient.fill(0.0);
         program.add_rows(&self.factors, &mut self.gradient);
-        program.add_slope_of_b(&self.behind, &mut self.gradient);
-        match o.norm {
-            Norm::Square => add(&mut self.gradient, 2.0 * o.l2, &self.weights),
+        program.add_slope_of_b(&self.at.behind, &mut self.gradient);
+        match o.choice.norm {
+            Norm::Square => add(&mut self.gradient, 2.0 * o.l2, &self.at.weights),
             Norm::Norm => {
                 let pull = self.pull();
                 add(&mut self.gradient, 1.0, &pull);
             }
         }
         let (mut near, mut anywhere) = (0.0, 0.0);
-        for n in 0..self.weights.len() {
-            let w = self.weights[n];
+        for n in 0..self.at.weights.len() {
+            let w = self.at.weights[n];
             self.gradient[n] += self.rho * (w - self.centre[n]) + self.penalty(n, w).0;
             let apart = o.bounds.upper[n] - o.bounds.lower[n];
             near += self.gradient[n].abs() * apart.min(2.0 * self.width);
@@ -464,8 +461,8 @@ impl<'a> Lagrangian<'a> {
 
     /// The gradient of the smoothed norm.
     fn pull(&self) -> Vec<f64> {
-        let factor = self.program.objective.l2 / self.length(dot(&self.weights, &self.weights));
-        self.weights.iter().map(|w| factor * w).collect()
+        let factor = self.program.objective.l2 / self.length(dot(&self.at.weights, &self.at.weights));
+        self.at.weights.iter().map(|w| factor * w).collect()
     }
 
     /// The term that holds weight `n` at 0 and within its bounds: its slope, whether it is active, and the value it
@@ -474,13 +471,7 @@ impl<'a> Lagrangian<'a> {
         let o = self.program.objective;
         let z = w + self.held[n] / self.sigma;
         let shift = o.l1 / self.sigma;
-        let soft = if z > shift {
-            z - shift
-        } else if z < -shift {
-            z + shift
-        } else {
-            0.0
-        };
+        let soft = (z - shift).max(0.0) + (z + shift).min(0.0);
         let at = soft.clamp(o.bounds.lower[n], o.bounds.upper[n]);
         let held = at != soft || (soft == 0.0 && shift > 0.0);
         // Not computed as sigma (z - at): z, at and w may be close and sigma large, which would lose digits.
@@ -492,8 +483,8 @@ impl<'a> Lagrangian<'a> {
     fn balance_multipliers(&mut self) {
         self.slope();
         let o = self.program.objective;
-        for n in 0..self.weights.len() {
-            let w = self.weights[n];
+        for n in 0..self.at.weights.len() {
+            let w = self.at.weights[n];
             let against = self.penalty(n, w).0 - self.gradient[n];
             self.held[n] = if w <= o.bounds.lower[n] || w >= o.bounds.upper[n] {
                 against
@@ -507,7 +498,7 @@ impl<'a> Lagrangian<'a> {
 
     /// The weights projected by l1 and the bounds: some exactly 0, none outside the bounds.
     fn candidate(&self) -> Vec<f64> {
-        (0..self.weights.len()).map(|n| self.penalty(n, self.weights[n]).2).collect()
+        (0..self.at.weights.len()).map(|n| self.penalty(n, self.at.weights[n]).2).collect()
     }
 
     /// What the slopes of the hard rows count their distances from their limits as, at a point.
@@ -521,10 +512,10 @@ impl<'a> Lagrangian<'a> {
     fn end_round(&mut self) {
         self.slopes();
         self.multipliers.copy_from_slice(&self.factors);
-        for n in 0..self.weights.len() {
-            self.held[n] = self.penalty(n, self.weights[n]).0;
+        for n in 0..self.at.weights.len() {
+            self.held[n] = self.penalty(n, self.at.weights[n]).0;
         }
-        self.centre.copy_from_slice(&self.weights);
+        self.centre.copy_from_slice(&self.at.weights);
     }
 
     /// Reduces the smoothing, and weakens the proximal term.

@@ -268,7 +268,6 @@ impl DualActiveSet {
                     if falls_left == 0
                         && let Some((_, active, multipliers)) = best.take()
                     {
-                        self.deactivate_all();
                         self.restore(&active, &multipliers);
                         continue;
                     }
@@ -305,7 +304,6 @@ impl DualActiveSet {
                     if self.dependent + 1 < DEPENDENT.len() {
                         self.dependent += 1;
                         let (active, multipliers) = (self.active.clone(), self.multipliers.clone());
-                        self.deactivate_all();
                         self.restore(&active, &multipliers);
                         self.ascend();
                     } else {

@@ -2,17 +2,13 @@
 
 use super::augmented::{Found, WarmStart};
 use crate::Stop;
-use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Objective, Parts, Point, Program, Proof, Relaxed, Rows, Tangents};
+use crate::learn::fit::{Fit, Left, Round, Status};
+use crate::learn::statement::{Objective, Point, Program, Proof, Relaxed, Rows};
 use crate::vectors::dot;
 
 /// The weights found, with what proves them.
 pub(crate) struct Minimum {
-    pub(crate) weights: Vec<f64>,
-    pub(crate) objective: f64,
-    pub(crate) parts: Parts,
-    pub(crate) gap: f64,
-    pub(crate) rounds: usize,
+    pub(crate) fit: Fit,
     pub(crate) rows: usize,
     /// The multiplier of each row as a share of the difference of its slopes.
     pub(crate) shares: Vec<f64>,
@@ -58,7 +54,9 @@ impl Relaxed {
             *part /= scale;
         }
         proof.divide(scale, 1.0);
-        Minimum { gap, weights: best.weights, objective: least, parts, rounds, rows, shares, proof }
+        let status = if gap <= tolerance { Status::Solved } else { Status::Stopped };
+        let fit = Fit { status, weights: best.weights, objective: least, parts, gap, rounds };
+        Minimum { fit, rows, shares, proof }
     }
 }
 
@@ -67,14 +65,8 @@ impl Program<'_> {
     fn prove(&self, point: &Point, multipliers: &[f64]) -> Proof {
         let length = dot(&point.weights, &point.weights).sqrt();
         let pull = if length > 0.0 { self.objective.l2 / length } else { 0.0 };
-        let at = Tangents {
-            weights: &point.weights,
-            excess: &point.excess,
-            behind: &point.behind,
-            multipliers,
-            pull: &point.weights.iter().map(|w| pull * w).collect::<Vec<_>>(),
-        };
-        self.proof(&at, point.parts.sum())
+        let pull: Vec<f64> = point.weights.iter().map(|w| pull * w).collect();
+        self.proof(point, multipliers, &pull, point.parts.sum())
     }
 
     /// Starts from a similar fit: solves over the rows that are near their kinks there, until no other row matters.

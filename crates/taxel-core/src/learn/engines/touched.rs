@@ -28,17 +28,17 @@ impl Relaxed {
         &self,
         objective: &Objective,
         tolerance: f64,
-        found: &mut Minimum,
+        Minimum { fit: found, shares, .. }: &mut Minimum,
         stop: Stop<'_>,
     ) -> Result<bool> {
         let (silent, theta) = (self.silent.len(), self.theta_0);
         let program = self.program(objective);
-        if found.gap > tolerance || found.shares.len() != program.rows() {
+        if found.gap > tolerance || shares.len() != program.rows() {
             return Ok(false);
         }
         let excess = program.point(found.weights.clone()).excess;
         let within = |row: usize| {
-            let share = found.shares[row] - program.least_share(row);
+            let share = shares[row] - program.least_share(row);
             excess[row].abs() <= NEARLY_MET * theta && share > WITHIN && share < 1.0 - WITHIN
         };
         let targets: Vec<usize> = (0..program.rows() - silent).filter(|k| within(silent + k)).collect();

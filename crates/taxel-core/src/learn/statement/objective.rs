@@ -113,12 +113,7 @@ pub(crate) struct Objective {
     pub(crate) b: f64,
     pub(crate) c: f64,
     pub(crate) d: f64,
-    /// The potential that B aims at after a target, in thresholds.
-    pub(crate) kappa: f64,
-    pub(crate) norm: Norm,
-    pub(crate) form_b: FormB,
-    pub(crate) sides_b: Sides,
-    pub(crate) sides_c: Sides,
+    pub(crate) choice: Choice,
     pub(crate) bounds: Bounds,
 }
 
@@ -127,13 +122,14 @@ pub(crate) struct Objective {
 pub(crate) struct Choice {
     /// `lambda_1` to `lambda_5`; if all are 0, any feasible weights are optimal.
     pub(crate) lambdas: [f64; 5],
+    /// The potential that B aims at after a target, in thresholds.
     pub(crate) kappa: f64,
     pub(crate) norm: Norm,
     pub(crate) form_b: FormB,
     /// The divisors of B, C and D.
     pub(crate) divisors: (Divisor, DivisorC, DivisorD),
-    /// The sides that count in B and in C.
-    pub(crate) sides: (Sides, Sides),
+    pub(crate) sides_b: Sides,
+    pub(crate) sides_c: Sides,
 }
 
 impl Objective {
@@ -153,7 +149,7 @@ impl Objective {
         unit: f64,
         d_max: impl FnOnce(&[f64]) -> f64,
     ) -> Self {
-        let Choice { lambdas, kappa, norm, form_b, divisors: (of_b, of_c, of_d), sides: (sides_b, sides_c) } = choice;
+        let Choice { lambdas, kappa, norm, form_b, divisors: (of_b, of_c, of_d), .. } = choice;
         let power = if form_b == FormB::Square { 2 } else { 1 };
         let sum: f64 = lambdas.iter().sum();
         let [l1, l2, b, c, d] = lambdas.map(|l| if sum > 0.0 { l / sum } else { 0.0 });
@@ -185,11 +181,7 @@ impl Objective {
                 DivisorD::Largest => 0.0,
                 DivisorD::Targets => over(d, count.max(1.0)) * unit,
             },
-            kappa,
-            norm,
-            form_b,
-            sides_b,
-            sides_c,
+            choice,
             bounds,
         }
     }
@@ -201,19 +193,19 @@ impl Objective {
 
     /// The l2 term, given the sum of squared weights.
     pub(crate) fn l2_term(&self, square: f64) -> f64 {
-        self.l2 * if self.norm == Norm::Norm { square.sqrt() } else { square }
+        self.l2 * if self.choice.norm == Norm::Norm { square.sqrt() } else { square }
     }
 
     /// The distance of the potential after each target to `kappa` thresholds, mV.
     pub(crate) fn missing_lift(&self, targets: &Targets, weights: &[f64]) -> Vec<f64> {
-        targets.iter().map(|row| dot(row.behind, weights) - self.kappa * row.threshold).collect()
+        targets.iter().map(|row| dot(row.behind, weights) - self.choice.kappa * row.threshold).collect()
     }
 
     /// B at these distances of the potentials to `kappa` thresholds, mV.
     pub(crate) fn b_at(&self, distances: &[f64]) -> f64 {
         let counted: Vec<f64> = distances.iter().map(|&x| self.counts_in_b(x)).collect();
         self.b
-            * match self.form_b {
+            * match self.choice.form_b {
                 FormB::Square => dot(&counted, &counted),
                 FormB::Sum => counted.iter().map(|x| x.abs()).sum(),
             }
@@ -221,17 +213,18 @@ impl Objective {
 
     /// The difference of objectives that counts as none beside B where every potential is 0.
     pub(crate) fn nothing_of_b(&self, targets: &Targets) -> f64 {
-        NOTHING * self.b_at(&targets.thresholds.iter().map(|threshold| -self.kappa * threshold).collect::<Vec<_>>())
+        NOTHING
+            * self.b_at(&targets.thresholds.iter().map(|threshold| -self.choice.kappa * threshold).collect::<Vec<_>>())
     }
 
     /// The distance that counts in B, given that of the potential to `kappa` thresholds, mV.
     pub(crate) fn counts_in_b(&self, distance: f64) -> f64 {
-        if self.sides_b == Sides::Both { distance } else { distance.min(0.0) }
+        if self.choice.sides_b == Sides::Both { distance } else { distance.min(0.0) }
     }
 
     /// C at one target without its factor, given the distance of the potential to the threshold, mV.
     pub(crate) fn c_at_distance(&self, distance: f64) -> f64 {
-        if self.sides_c == Sides::Both { distance.abs() } else { (-distance).max(0.0) }
+        if self.choice.sides_c == Sides::Both { distance.abs() } else { (-distance).max(0.0) }
     }
 
     /// The terms of 6.11 at these weights.
@@ -249,7 +242,7 @@ impl Objective {
 
     /// An upper bound on each weight if the objective is at most `most`: l1 and l2 alone would exceed it otherwise.
     pub(crate) fn reach(&self, most: f64) -> f64 {
-        let reach = match self.norm {
+        let reach = match self.choice.norm {
             Norm::Norm => most / (self.l1 + self.l2),
             Norm::Square => (most / self.l1).min((most / self.l2).sqrt()),
         };

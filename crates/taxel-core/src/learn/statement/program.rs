@@ -77,16 +77,6 @@ pub(crate) struct Point {
     pub(crate) parts: Parts,
 }
 
-/// The data of the tangents below an objective: weights, their rows' excess, one multiplier per row, and the pull of the
-/// norm.
-pub(crate) struct Tangents<'a> {
-    pub(crate) weights: &'a [f64],
-    pub(crate) excess: &'a [f64],
-    pub(crate) behind: &'a [f64],
-    pub(crate) multipliers: &'a [f64],
-    pub(crate) pull: &'a [f64],
-}
-
 /// A lower bound on an objective, and the slopes of the tangents that prove it.
 #[derive(Debug, Clone)]
 pub(crate) struct Proof {
@@ -106,7 +96,7 @@ impl Program<'_> {
 
     /// The number of rows after targets: none if B is a sum of squares.
     pub(crate) fn sums(&self) -> usize {
-        if self.objective.form_b == FormB::Sum { self.targets.len() } else { 0 }
+        if self.objective.choice.form_b == FormB::Sum { self.targets.len() } else { 0 }
     }
 
     /// The number of rows.
@@ -128,7 +118,7 @@ impl Program<'_> {
 
     /// The rows of the targets and those after them: coefficients, and the potential that they ask for, mV.
     pub(crate) fn stored(&self) -> impl Iterator<Item = (&[f64], f64)> {
-        let kappa = self.objective.kappa;
+        let kappa = self.objective.choice.kappa;
         let after = self.targets.iter().take(self.sums()).map(move |row| (row.behind, kappa * row.threshold));
         self.targets.iter().map(|row| (row.at, row.threshold)).chain(after)
     }
@@ -200,18 +190,19 @@ impl Program<'_> {
         Point { weights, excess, behind, parts }
     }
 
-    /// The proof of a lower bound by these tangents, given that the least value of the objective is at most `most`.
-    pub(crate) fn proof(&self, at: &Tangents<'_>, most: f64) -> Proof {
+    /// The proof of a lower bound by the tangents below the objective at these weights, with one multiplier per row and the
+    /// pull of the norm, given that the least value of the objective is at most `most`.
+    pub(crate) fn proof(&self, at: &Point, multipliers: &[f64], pull: &[f64], most: f64) -> Proof {
         let objective = self.objective;
         let squares = at.behind.iter().map(|&x| 2.0 * objective.b * objective.counts_in_b(x));
-        let after = at.multipliers[self.limit.len() + self.targets.len()..].iter().copied();
+        let after = multipliers[self.limit.len() + self.targets.len()..].iter().copied();
         Proof {
-            bound: self.bound(at, most),
-            multipliers: at.multipliers.to_vec(),
+            bound: self.bound(at, multipliers, pull, most),
+            multipliers: multipliers.to_vec(),
             behind: squares.chain(after).collect(),
-            pull: match objective.norm {
+            pull: match objective.choice.norm {
                 Norm::Square => at.weights.iter().map(|w| 2.0 * objective.l2 * w).collect(),
-                Norm::Norm => at.pull.to_vec(),
+                Norm::Norm => pull.to_vec(),
             },
         }
     }
@@ -232,29 +223,29 @@ impl Program<'_> {
     /// multipliers between their slopes, the norm by a `pull` no longer than its factor, a square by its slope. The
     /// remaining function, linear plus l1 over the box, is minimised synapse by synapse. The bound therefore holds for
     /// any multipliers, however they were found.
-    fn bound(&self, at: &Tangents<'_>, most: f64) -> f64 {
+    fn bound(&self, at: &Point, multipliers: &[f64], pull: &[f64], most: f64) -> f64 {
         let objective = self.objective;
         let reach = objective.reach(most);
         let mut gradient = vec![0.0; self.trains()];
-        self.add_rows(at.multipliers, &mut gradient);
-        self.add_slope_of_b(at.behind, &mut gradient);
+        self.add_rows(multipliers, &mut gradient);
+        self.add_slope_of_b(&at.behind, &mut gradient);
         let mut bound: f64 = at.behind.iter().map(|&x| objective.b * objective.counts_in_b(x).powi(2)).sum();
-        match objective.norm {
+        match objective.choice.norm {
             Norm::Square => {
-                add(&mut gradient, 2.0 * objective.l2, at.weights);
-                bound += objective.l2 * dot(at.weights, at.weights);
+                add(&mut gradient, 2.0 * objective.l2, &at.weights);
+                bound += objective.l2 * dot(&at.weights, &at.weights);
             }
             Norm::Norm => {
-                add(&mut gradient, 1.0, at.pull);
-                bound += dot(at.pull, at.weights);
+                add(&mut gradient, 1.0, pull);
+                bound += dot(pull, &at.weights);
             }
         }
-        for (&multiplier, &x) in at.multipliers.iter().zip(at.excess) {
+        for (&multiplier, &x) in multipliers.iter().zip(&at.excess) {
             if multiplier != 0.0 {
                 bound += multiplier * x;
             }
         }
-        for (n, (&g, &w)) in gradient.iter().zip(at.weights).enumerate() {
+        for (n, (&g, &w)) in gradient.iter().zip(&at.weights).enumerate() {
             let cost = |v: f64| g * (v - w) + objective.l1 * v.abs();
             let (lower, upper) = (objective.bounds.lower[n].max(-reach), objective.bounds.upper[n].min(reach));
             let ends = cost(lower).min(cost(upper));

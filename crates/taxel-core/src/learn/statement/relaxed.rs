@@ -67,7 +67,11 @@ impl Relaxed {
             targets: &self.targets,
             gram: &self.gram,
             objective,
-            slopes: [[0.0, objective.d], objective.sides_c.slopes(objective.c), objective.sides_b.slopes(objective.b)],
+            slopes: [
+                [0.0, objective.d],
+                objective.choice.sides_c.slopes(objective.c),
+                objective.choice.sides_b.slopes(objective.b),
+            ],
             theta_0: self.theta_0,
         }
     }

@@ -157,13 +157,7 @@ pub(crate) struct Example {
 /// # Errors
 ///
 /// `Problem` if a target, or the pattern's start, is after the horizon.
-pub(crate) fn end_of(
-    neuron: &Neuron,
-    horizon: Option<f64>,
-    p: usize,
-    pattern: &SpikeTrains,
-    targets: &[f64],
-) -> Result<f64> {
+fn end_of(neuron: &Neuron, horizon: Option<f64>, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<f64> {
     let last = targets.last();
     let Some(end) = horizon else { return Ok(last.map_or(pattern.stop, |last| pattern.stop.max(last + neuron.tau))) };
     if let Some(last) = last.filter(|last| **last > end) {
@@ -237,16 +231,17 @@ impl Statement {
         Self { neuron, shape, margin, unit, taper, trains, examples: vec![] }
     }
 
-    /// Adds a pattern, which the caller has checked, the windows of its silence, if any, and its end, ms; if the caller
-    /// stops it, nothing changes.
+    /// Adds a pattern, number `p` to the caller, who has checked it, and the windows of its silence, if any; its silence
+    /// ends at the horizon, ms, if there is one. On an error nothing changes.
     pub(crate) fn push(
         &mut self,
-        pattern: &SpikeTrains,
+        (p, pattern): (usize, &SpikeTrains),
         targets: &[f64],
         silence: Option<&[[f64; 2]]>,
-        end: f64,
+        horizon: Option<f64>,
         stop: Stop<'_>,
     ) -> Result<()> {
+        let end = end_of(&self.neuron, horizon, p, pattern, targets)?;
         let inputs = pattern.by_time(stop)?;
         let (fast, scale) = self.fast_and_scale();
         let ages = if self.neuron.time == Time::Grid { E * (end - pattern.start) / fast } else { 0.0 };

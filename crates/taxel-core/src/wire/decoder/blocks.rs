@@ -6,10 +6,9 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-mod carried;
 mod scalar;
 
-pub(super) use carried::Carried;
+pub(super) use scalar::Carried;
 
 use crate::vectors::Instructions;
 use crate::wire::columns::Columns;

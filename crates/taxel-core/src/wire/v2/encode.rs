@@ -4,7 +4,7 @@
 //! events that were decoded from states. Every event is written; decoding returns the same columns.
 
 use super::event_words::{EventWords, marker_body};
-use super::{BASE_BITS, BodyKind, DATAGRAM_BYTES, DatagramHeader, NEVER, checked_stride};
+use super::{BASE_BITS, BodyKind, DatagramHeader, NEVER, checked_stride};
 use crate::events::EventsView;
 use crate::{Result, problem};
 
@@ -163,10 +163,8 @@ impl<'a> Writing<'a> {
             span,
         };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut datagram = Vec::with_capacity(DATAGRAM_BYTES);
-        header.write(body, &mut datagram);
         self.out.offsets.push(self.out.bytes.len() as i64);
-        self.out.bytes.extend(datagram);
+        self.out.bytes.extend(header.datagram(body));
         self.out.times.push(time);
     }
 }

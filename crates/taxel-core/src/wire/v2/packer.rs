@@ -1,9 +1,7 @@
 //! Encodes events as datagrams of version 2, as the board sends them.
 
 use super::event_words::{EventWords, marker_body};
-use super::{
-    BoardTotals, BodyKind, DATAGRAM_BYTES, DIFFERENCES, DROPPED, DatagramHeader, FRAME_SYNC, Layout, checked_stride,
-};
+use super::{BoardTotals, BodyKind, DIFFERENCES, DROPPED, DatagramHeader, FRAME_SYNC, Layout, checked_stride};
 use crate::{Array, Result, problem};
 
 /// For how long after an event the end of every frame is promised, us.
@@ -191,9 +189,7 @@ impl Packer {
             span,
         };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut datagram = Vec::with_capacity(DATAGRAM_BYTES);
-        header.write(body, &mut datagram);
-        self.complete.push((datagram, events));
+        self.complete.push((header.datagram(body), events));
     }
 }
 

@@ -1,21 +1,14 @@
 //! Lower bounds on the objective.
 
 use super::Lagrangian;
-use crate::learn::statement::{Norm, Point, Proof, Tangents};
+use crate::learn::statement::{Norm, Point, Proof};
 use crate::vectors::dot;
 
 impl Lagrangian<'_> {
     /// The lower bound that the present multipliers prove.
     pub(super) fn proof(&mut self) -> Proof {
         self.slopes();
-        let at = Tangents {
-            weights: &self.weights,
-            excess: &self.excess,
-            behind: &self.behind,
-            multipliers: &self.factors,
-            pull: &self.pull(),
-        };
-        self.program.proof(&at, self.most)
+        self.program.proof(&self.at, &self.factors, &self.pull(), self.most)
     }
 
     /// The lower bound on 6.14 at weights of 0, with the subgradient of the norm nearest to the sum of all other slopes
@@ -33,18 +26,12 @@ impl Lagrangian<'_> {
             }
         };
         let multipliers: Vec<f64> = zero.excess.iter().enumerate().map(slope).collect();
-        let mut pull = vec![0.0; self.weights.len()];
-        if o.norm == Norm::Norm && o.l2 > 0.0 && zero.weights.iter().all(|&w| w == 0.0) {
+        let mut pull = vec![0.0; self.at.weights.len()];
+        if o.choice.norm == Norm::Norm && o.l2 > 0.0 && zero.weights.iter().all(|&w| w == 0.0) {
             program.add_rows(&multipliers, &mut pull);
             program.add_slope_of_b(&zero.behind, &mut pull);
             for (n, p) in pull.iter_mut().enumerate() {
-                let soft = if *p > o.l1 {
-                    *p - o.l1
-                } else if *p < -o.l1 {
-                    *p + o.l1
-                } else {
-                    0.0
-                };
+                let soft = (*p - o.l1).max(0.0) + (*p + o.l1).min(0.0);
                 let free = if soft > 0.0 { o.bounds.lower[n] < 0.0 } else { o.bounds.upper[n] > 0.0 };
                 *p = if free { -soft } else { 0.0 };
             }
@@ -53,13 +40,6 @@ impl Lagrangian<'_> {
                 pull.iter_mut().for_each(|p| *p *= o.l2 / length);
             }
         }
-        let at = Tangents {
-            weights: &zero.weights,
-            excess: &zero.excess,
-            behind: &zero.behind,
-            multipliers: &multipliers,
-            pull: &pull,
-        };
-        program.proof(&at, zero.parts.sum())
+        program.proof(zero, &multipliers, &pull, zero.parts.sum())
     }
 }

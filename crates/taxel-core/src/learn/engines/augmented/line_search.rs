@@ -25,19 +25,19 @@ impl Lagrangian<'_> {
             program.silent.potential(direction, &mut rise);
         }
         rise.extend(program.stored().map(|(row, _)| dot(row, direction)));
-        let squared = program.targets.iter().take(self.behind.len());
+        let squared = program.targets.iter().take(self.at.behind.len());
         let lift: Vec<f64> = squared.map(|row| dot(row.behind, direction)).collect();
         let smooth = {
             let against: f64 =
-                self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
+                self.at.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
             let square = dot(direction, direction);
             let (mut from, mut bend) = (self.rho * against, self.rho * square);
-            if o.sides_b == Sides::Both {
-                from += 2.0 * o.b * dot(&self.behind, &lift);
+            if o.choice.sides_b == Sides::Both {
+                from += 2.0 * o.b * dot(&self.at.behind, &lift);
                 bend += 2.0 * o.b * dot(&lift, &lift);
             }
-            if o.norm == Norm::Square {
-                from += 2.0 * o.l2 * dot(&self.weights, direction);
+            if o.choice.norm == Norm::Square {
+                from += 2.0 * o.l2 * dot(&self.at.weights, direction);
                 bend += 2.0 * o.l2 * square;
             }
             (from, bend)
@@ -77,9 +77,9 @@ impl Lagrangian<'_> {
         if !(t.is_finite() && start.is_finite()) {
             return false;
         }
-        add(&mut self.weights, t, direction);
-        self.excess.iter_mut().zip(&rise).for_each(|(x, r)| *x += t * r);
-        add(&mut self.behind, t, &lift);
+        add(&mut self.at.weights, t, direction);
+        self.at.excess.iter_mut().zip(&rise).for_each(|(x, r)| *x += t * r);
+        add(&mut self.at.behind, t, &lift);
         true
     }
 
@@ -88,7 +88,7 @@ impl Lagrangian<'_> {
         let steep = self.steep();
         let mut passing = Vec::new();
         let mut steady = 0.0;
-        let rows = self.excess.iter().zip(rise).zip(&self.multipliers);
+        let rows = self.at.excess.iter().zip(rise).zip(&self.multipliers);
         for (k, ((&x, &rise), &multiplier)) in rows.enumerate() {
             let kind = self.program.kind(k);
             let [low, high] = self.program.slopes[kind];
@@ -116,8 +116,8 @@ impl Lagrangian<'_> {
     ) -> f64 {
         let mut sum = smooth.0 + t * smooth.1 + steady;
         let o = self.program.objective;
-        if o.sides_b == Sides::Below {
-            for (&x, &l) in self.behind.iter().zip(lift) {
+        if o.choice.sides_b == Sides::Below {
+            for (&x, &l) in self.at.behind.iter().zip(lift) {
                 sum += 2.0 * o.b * (x + t * l).min(0.0) * l;
             }
         }
@@ -126,13 +126,13 @@ impl Lagrangian<'_> {
             sum += p.rise * (p.slope + t * p.change).clamp(low, high);
         }
         let (mut along, mut square) = (0.0, 0.0);
-        for (n, (&w, &d)) in self.weights.iter().zip(direction).enumerate() {
+        for (n, (&w, &d)) in self.at.weights.iter().zip(direction).enumerate() {
             let weight = w + t * d;
             sum += self.penalty(n, weight).0 * d;
             along += weight * d;
             square += weight * weight;
         }
-        if o.norm == Norm::Norm {
+        if o.choice.norm == Norm::Norm {
             sum += o.l2 * along / self.length(square);
         }
         sum

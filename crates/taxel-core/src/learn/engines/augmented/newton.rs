@@ -30,16 +30,16 @@ const REFINED: usize = 1;
 impl Lagrangian<'_> {
     /// Takes one Newton step with an exact line search; returns false if rounding leaves no direction.
     pub(super) fn step(&mut self) -> bool {
-        let n = self.weights.len();
+        let n = self.at.weights.len();
         let mut curvature = self.curvature();
         // A system over rows loses digits where these are hard, hence steep, and where no l2 term holds the weights.
         let exact = !self.program.is_hard() && self.program.objective.l2 > 0.0;
-        let rows = curvature.count + if curvature.both_sides > 0.0 { self.behind.len() } else { 0 };
+        let rows = curvature.count + if curvature.both_sides > 0.0 { self.at.behind.len() } else { 0 };
         let few = exact && 2 * rows < n;
         if few && curvature.both_sides > 0.0 {
             let root = curvature.both_sides.sqrt();
             curvature.rows.extend(self.program.targets.iter().flat_map(|row| row.behind.iter().map(|v| root * v)));
-            curvature.count += self.behind.len();
+            curvature.count += self.at.behind.len();
         }
         let direction = loop {
             let found = if few { self.over_rows(&curvature) } else { self.over_weights(&curvature) };
@@ -62,7 +62,7 @@ impl Lagrangian<'_> {
 
     fn curvature(&self) -> Curvature {
         let (program, o) = (self.program, self.program.objective);
-        let n = self.weights.len();
+        let n = self.at.weights.len();
         let silent = program.limit.len();
         let kept = self.inside.partition_point(|&k| k < silent);
         let apart = if self.samples { (kept * n).div_ceil(WRITTEN).max(1) } else { 1 };
@@ -75,31 +75,32 @@ impl Lagrangian<'_> {
             rows.extend(program.stored_row(k - silent).iter().map(|v| root * v));
         }
         let mut count = written.len() + self.inside.len() - kept;
-        if o.sides_b == Sides::Below {
+        if o.choice.sides_b == Sides::Below {
             let root = (2.0 * o.b).sqrt();
-            for (target, _) in program.targets.iter().zip(&self.behind).filter(|(_, behind)| **behind < 0.0) {
+            for (target, _) in program.targets.iter().zip(&self.at.behind).filter(|(_, behind)| **behind < 0.0) {
                 rows.extend(target.behind.iter().map(|v| root * v));
                 count += 1;
             }
         }
-        let length = self.length(dot(&self.weights, &self.weights));
-        let (ridge, concave) = match o.norm {
+        let length = self.length(dot(&self.at.weights, &self.at.weights));
+        let (ridge, concave) = match o.choice.norm {
             Norm::Square => (2.0 * o.l2, 0.0),
             Norm::Norm => (o.l2 / length, o.l2 / (length * length * length)),
         };
-        let held = |i: usize| if self.penalty(i, self.weights[i]).1 { self.sigma } else { 0.0 };
+        let held = |i: usize| if self.penalty(i, self.at.weights[i]).1 { self.sigma } else { 0.0 };
         let diagonal = (0..n).map(|i| ridge + self.rho + held(i)).collect();
-        let both_sides = if (o.form_b, o.sides_b) == (FormB::Square, Sides::Both) { 2.0 * o.b } else { 0.0 };
+        let both_sides =
+            if (o.choice.form_b, o.choice.sides_b) == (FormB::Square, Sides::Both) { 2.0 * o.b } else { 0.0 };
         Curvature { rows, count, both_sides, diagonal, concave }
     }
 
     /// The Newton direction by a system as large as the weights; none if it is not positive definite.
     fn over_weights(&mut self, curvature: &Curvature) -> Option<Vec<f64>> {
-        let n = self.weights.len();
+        let n = self.at.weights.len();
         self.hessian.iter_mut().zip(self.program.gram).for_each(|(h, g)| *h = curvature.both_sides * g);
         if curvature.concave != 0.0 {
-            for (column, &w) in self.hessian.chunks_exact_mut(n).zip(&self.weights) {
-                add(column, -curvature.concave * w, &self.weights);
+            for (column, &w) in self.hessian.chunks_exact_mut(n).zip(&self.at.weights) {
+                add(column, -curvature.concave * w, &self.at.weights);
             }
         }
         self.hessian.iter_mut().step_by(n + 1).zip(&curvature.diagonal).for_each(|(h, d)| *h += d);
@@ -120,7 +121,7 @@ impl Lagrangian<'_> {
     /// The Newton direction by a system as large as the rows (Woodbury), and a concave term of rank one (Sherman,
     /// Morrison); none if they are not positive definite.
     fn over_rows(&mut self, curvature: &Curvature) -> Option<Vec<f64>> {
-        let (n, count) = (self.weights.len(), curvature.count);
+        let (n, count) = (self.at.weights.len(), curvature.count);
         let roots: Vec<f64> = curvature.diagonal.iter().map(|d| d.sqrt()).collect();
         let scaled = |v: &[f64]| -> Vec<f64> { v.iter().zip(&roots).map(|(v, root)| v / root).collect() };
         let rows: Vec<f64> = curvature.rows.chunks_exact(n).flat_map(scaled).collect();
@@ -144,7 +145,7 @@ impl Lagrangian<'_> {
             along.iter().zip(rows.chunks_exact(n)).for_each(|(&factor, row)| add(&mut out, -factor, row));
             scaled(&out)
         };
-        let weights = &self.weights;
+        let weights = &self.at.weights;
         let (pulled, left) = if curvature.concave == 0.0 {
             (vec![], 1.0)
         } else {

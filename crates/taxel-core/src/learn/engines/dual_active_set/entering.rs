@@ -50,17 +50,10 @@ impl DualActiveSet {
         for block in slots.chunks(BLOCK) {
             let block: Vec<usize> = block.iter().copied().filter(|&slot| self.positions[slot].is_none()).collect();
             let stride = self.factor.padded_length();
-            let mut g = vec![0.0; stride * block.len()];
-            let mut inner_products = vec![0.0; block.len() * block.len()];
-            for (k, &slot) in block.iter().enumerate() {
-                let row = &self.gram[slot * self.gram_stride..][..self.gram_stride];
-                for (value, &slot) in g[k * stride..].iter_mut().zip(&self.active) {
-                    *value = row[slot];
-                }
-                for (value, &slot) in inner_products[k * block.len()..].iter_mut().zip(&block) {
-                    *value = row[slot];
-                }
-            }
+            let mut g: Vec<f64> = block.iter().flat_map(|&slot| self.products(slot)).collect();
+            let (gram, wide) = (&self.gram, self.gram_stride);
+            let products = |&slot: &usize| block.iter().map(move |&other| gram[slot * wide + other]);
+            let mut inner_products: Vec<f64> = block.iter().flat_map(products).collect();
             let limits: Vec<f64> = block.iter().map(|&slot| self.rows[slot].limit).collect();
             for k in self.factor.append(&mut g, stride, &mut inner_products, &limits, DOUBTFUL, self.lower.len()) {
                 self.positions[block[k]] = Some(self.active.len());
@@ -69,9 +62,10 @@ impl DualActiveSet {
         }
     }
 
-    /// Activates these rows with their multipliers: in blocks first, then the nearly dependent ones one by one with
-    /// exact pivots.
+    /// Activates these rows with their multipliers, and no others: in blocks first, then the nearly dependent ones one by
+    /// one with exact pivots.
     pub(super) fn restore(&mut self, slots: &[usize], multipliers: &[f64]) {
+        self.deactivate_all();
         self.activate(slots);
         for &slot in slots {
             if self.positions[slot].is_none() {

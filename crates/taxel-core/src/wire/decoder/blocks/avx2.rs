@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::carried::{Carried, indices};
+use super::scalar::Carried;
 use crate::vectors::TO_FRONT;
 use crate::wire::columns::Columns;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
@@ -14,16 +14,17 @@ const BYTES: usize = WORDS * WORD_BYTES;
 const LOADS: [usize; 3] = [0, 15, 24];
 
 /// For each 16-bit lane, the positions of its two bytes in each of the three loads; 0x80 selects zero.
-const fn fetch(bytes: [Option<u8>; 2]) -> [[u8; 16]; 3] {
+const fn fetch(bytes: [Option<usize>; 2]) -> [[u8; 16]; 3] {
     let mut shuffles = [[0x80; 16]; 3];
     let mut load = 0;
     while load < 3 {
-        let bytes_of_load: [u8; 16] = indices(bytes, LOADS[load] as i32, 16, 0x80);
         // The words that are read from this load; each word is read from one load only.
         let words = [[0, 3], [3, 6], [6, 8]][load];
         let mut k = 2 * words[0];
         while k < 2 * words[1] {
-            shuffles[load][k] = bytes_of_load[k];
+            if let Some(j) = bytes[k % 2] {
+                shuffles[load][k] = (k / 2 * WORD_BYTES + j - LOADS[load]) as u8;
+            }
             k += 1;
         }
         load += 1;

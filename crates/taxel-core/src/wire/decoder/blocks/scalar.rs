@@ -1,8 +1,36 @@
-//! Decodes plain words one by one, on any machine.
+//! The state that a loop over plain words carries, and the loop that decodes them one by one, on any machine.
 
-use super::carried::{Carried, value};
 use crate::wire::columns::Columns;
+use crate::wire::decoder::clock::{FARTHEST_BACK, TURN};
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
+
+/// Largest distance of a stamp ahead of the latest time that is not ambiguous: see [`FARTHEST_BACK`].
+const FARTHEST_AHEAD: i64 = TURN - FARTHEST_BACK - 1;
+
+/// The state of the block loop besides the rows.
+pub(crate) struct Carried {
+    /// Current time, in stamps: the latest time, or after a step back the time in the reordered stretch.
+    pub(crate) latest: i64,
+    /// The time up to which words are plain, in stamps.
+    pub(crate) until: i64,
+    /// Number of intensities with a change, and number without.
+    pub(crate) intensities: u64,
+    pub(crate) unpaired: u64,
+}
+
+impl Carried {
+    /// Largest distance of a stamp ahead of the current time; 0 or more until `until` is passed.
+    #[inline(always)]
+    pub(super) fn largest_lead(&self) -> u16 {
+        (self.until - self.latest).min(FARTHEST_AHEAD) as u16
+    }
+}
+
+/// The 16-bit value of a word; the caller has checked that its bytes are in place.
+#[inline(always)]
+fn value(word: &[u8]) -> u16 {
+    u16::from(word[0]) << 14 | u16::from(word[1]) << 7 | u16::from(word[2])
+}
 
 /// See [`super::blocks`]; decodes at most `most` words. The first pair of all columns counts as not plain.
 pub(super) fn words(
@@ -27,7 +55,7 @@ pub(super) fn words(
     let (mut n, mut done) = (0, 0);
     for word in bytes.chunks_exact(WORD_BYTES).take(words) {
         let taxel = (u16::from(word[3] & 0x3f), u16::from(word[4] & 0x3f));
-        let ahead = value(word, 0).wrapping_sub(state.latest as u16);
+        let ahead = value(word).wrapping_sub(state.latest as u16);
         let in_place = word[0] & FIRST != 0 && (word[1] | word[2] | word[3] | word[4]) & FIRST == 0;
         if !in_place || word[0] & 0x08 != 0 || taxel.0 >= columns || taxel.1 >= rows {
             break;
@@ -48,7 +76,7 @@ pub(super) fn words(
             if !paired {
                 break;
             }
-            (ticks[n + back - 1], present[n + back - 1]) = (value(word, 0), 1);
+            (ticks[n + back - 1], present[n + back - 1]) = (value(word), 1);
             state.intensities += 1;
             open = false;
         } else {

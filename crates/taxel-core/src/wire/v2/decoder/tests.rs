@@ -12,9 +12,7 @@ use crate::wire::v2::BodyKind;
 fn datagram(kind: BodyKind, session: u16, sequence: u32, base: u64, body: &[u8]) -> Vec<u8> {
     let (kind, stride) = (kind as u8, crate::wire::v2::stride(64));
     let header = DatagramHeader { kind, board: 0, sequence, base, session, stride, line: 0, flags: 0, span: 0 };
-    let mut bytes = vec![];
-    header.write(body, &mut bytes);
-    bytes
+    header.datagram(body)
 }
 
 #[test]
