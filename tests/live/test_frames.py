@@ -115,12 +115,10 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert np.array_equal(frames.t, t)
     assert np.array_equal(frames.values, values.astype(np.float32))
     assert (frames.unit, recording.frame_us) == (unit, live.frame_us)
-    assert summary.verdict.status == recording.verdict.status == "complete after arrival"
     assert summary.verdict == recording.verdict
-    # A busy machine may have been silent for a second meanwhile, which the verdict says too.
-    assert recording.verdict.startswith(
-        "nothing lost after arrival (lines are not numbered, so losses before arrival are unknown)"
-    )
+    # Stamps of 3 s arrive at once, but on a busy machine in seconds: then their clock is doubted.
+    assert not summary.verdict.lost
+    assert {*summary.verdict.damaged} <= {"drifts_from_arrival"}
     expected = run(detector, recording)
     assert len(expected) >= 5
     assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]

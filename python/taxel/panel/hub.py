@@ -9,11 +9,12 @@ import threading
 from collections.abc import Callable, Coroutine, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from taxel import _core
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import PlainRule, Readout, load
 from taxel.detect.board import differences
@@ -21,7 +22,8 @@ from taxel.device import Cable
 from taxel.frames import Frames
 from taxel.live import Live
 from taxel.panel.board import Board
-from taxel.panel.folder import Folder, Shown
+from taxel.panel.client import Client
+from taxel.panel.folder import Folder
 from taxel.panel.labels import LabelTables
 from taxel.panel.messages import text_of
 from taxel.panel.recorder import Recorder
@@ -35,30 +37,6 @@ _T = TypeVar("_T")
 
 #: How often counters are sent, tables of labels are looked at, and registers are read, s.
 _COUNT_S, _FOLLOW_S, _READ_S = 0.25, 0.3, 2.0
-
-
-class Client(Protocol):
-    """Serve a client: a session."""
-
-    view: _core.PanelView
-    shown: Shown | None
-    credits: int
-    answers: bool
-
-    async def say(self, message: dict[str, Any] | str) -> None:
-        """Send a message."""
-
-    async def send_frame(self) -> None:
-        """Send a frame, if there is a new one."""
-
-    def waiting(self) -> int:
-        """Return how many bytes wait for the client."""
-
-    def unread_s(self, waiting: int, now: float) -> float:
-        """Return for how long the client has read nothing of what waits for it, s."""
-
-    def abort(self) -> None:
-        """Disconnect the client at once."""
 
 
 class Hub:
@@ -96,15 +74,15 @@ class Hub:
         tables: str,
     ) -> None:
         self.sessions: list[Client] = []
-        #: Requests that are carried out beside others.
-        self.tasks: set[asyncio.Task[None]] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
         self.opened, self.registers_stated = opened, registers_stated
-        self.recorder: Recorder = Recorder(self)
-        self.folder = Folder(folder, opening, opened if asked else None, lambda: self.recorder.runs)
+        self.recorder = Recorder(self.say, self._mark)
+        self.folder = Folder(folder, opening, opened if asked else None, lambda: self.records)
         self.labels = LabelTables(self.folder, opening, tables)
         self.training = Training(opening, self.folder.files)
         self.board, self._on_board = Board(cable), asyncio.Lock()
-        self.source: _core.PanelLive | None = None
+        #: The live sources that views have shown, by name; the first is read out.
+        self._sources: dict[str, _core.PanelLive] = {}
         #: In what the board was said to differ from that of the readout's training.
         self._differing = ""
         # Locked while one `Live` replaces another.
@@ -112,6 +90,11 @@ class Hub:
         self._live = self._first = live
         if live is not None:
             self._show_live(live)
+
+    @property
+    def source(self) -> _core.PanelLive | None:
+        """The live source that is read out, as views see it."""
+        return next(iter(self._sources.values()), None)
 
     @property
     def live(self) -> Live | None:
@@ -129,6 +112,11 @@ class Hub:
         """End a training, which no request may wait for."""
         self.training.close()
 
+    def keep(self, task: asyncio.Task[None]) -> None:
+        """Let a task go on when who began it has left."""
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
     def works(self) -> Iterator[Coroutine[Any, Any, None]]:
         """Yield what is done beside the clients until the server ends."""
         yield self._count()
@@ -141,39 +129,42 @@ class Hub:
     def join(self, session: Client) -> None:
         """Count another client."""
         self.sessions.append(session)
-        if self.source is not None:
-            self.source.watch(True)
+        self._watch()
 
     def leave(self, session: Client) -> None:
         """Count one client less."""
         self.sessions.remove(session)
-        if self.source is not None and not self.sessions:
-            self.source.watch(False)
+        self._watch()
 
-    async def say(self, message: dict[str, Any] | str) -> None:
-        """Send a message to all clients."""
+    def _watch(self) -> None:
+        for source in self._sources.values():
+            source.watch(bool(self.sessions))
+
+    async def say(self, message: dict[str, Any] | str, source: _core.PanelLive | None = None) -> None:
+        """Send a message to all clients, or to those that follow a source."""
         text = message if isinstance(message, str) else await text_of(message)
         for session in list(self.sessions):
-            await session.say(text)
+            if source is None or session.follows is source:
+                await session.say(text)
 
     async def warn(self, reason: object) -> None:
         """Tell all clients what went wrong."""
         await self.say({"type": "warning", "text": str(reason)})
 
     async def tell(self) -> None:
-        """Send what has happened at the live source."""
-        news = None if self.source is None else self.source.news()
-        if news is None:
-            return
-        detections, was_reset, zeroed, about = news
-        for text in detections:
-            await self.say(text)
-        if was_reset:
-            await self.forget_registers()
-        if zeroed:
-            await self.say(self.zeroed())
-        if about:
-            await self.say(self.hello())
+        """Send what has happened at the live sources."""
+        for source in [*self._sources.values()]:
+            if (news := source.news()) is None:
+                continue
+            detections, was_reset, zeroed, about = news
+            for text in detections:
+                await self.say(text)
+            if was_reset and source is self.source:
+                await self.forget_registers()
+            if zeroed:
+                await self.say(self.zeroed(source), source)
+            if about:
+                await self.say(self.hello(source), source)
 
     # ---------------------------------------------------------------------------------------------- the live source
 
@@ -189,14 +180,21 @@ class Hub:
             raise ProblemError("no board is connected")
         return self.source
 
+    def source_of(self, name: str) -> _core.PanelLive:
+        """Return one of the live sources as views see it; a ProblemError says that there is none of that name."""
+        if name not in self._sources:
+            self._sources[name] = self.needed_source().of_source(name)
+            self._watch()
+        return self._sources[name]
+
     def _show_live(self, live: Live) -> None:
         """Show another live source from now on."""
         # It may be the board whose registers were read: then the other source begins with them.
         source = _core.PanelLive(live._core, json.dumps(self.board.registers) if self.board.known else None)
         if not self.board.known:
             self.board.registers = source.registers()
-        source.watch(bool(self.sessions))
-        self._live, self.source = live, source
+        self._live, self._sources = live, {live.name: source}
+        self._watch()
 
     async def restart(self, change: Callable[[Live], Live]) -> None:
         """Show the `Live` that a function makes of the one before.
@@ -219,10 +217,10 @@ class Hub:
 
         await in_thread(replaced)
         for session in self.sessions:
-            session.view.set_live(self.source)
-        await self.say(self.hello())
+            session.follow(self.source)
+        await self.say(self.hello(self.source))
         await self.say(self.registers())
-        await self.say(self.zeroed())
+        await self.say(self.zeroed(self.source))
 
     async def read_source(self, source: str) -> None:
         """Receive another source, as `sources` of `taxel.live.Live` names it, with all other options unchanged.
@@ -294,12 +292,51 @@ class Hub:
         else:
             await self._begin_readout(lambda: readout)
 
+    # ---------------------------------------------------------------------------------------------- recording
+
+    @property
+    def records(self) -> bool:
+        """Whether any recording of the live source runs, also one that the page did not begin."""
+        return self.recorder.is_busy or (self.source is not None and self.source.is_recording())
+
+    async def record(self, name: str, label: str | None, length_s: float | None) -> None:
+        """Begin a recording, which ends by itself after `length_s`, and goes on without clients.
+
+        Raises
+        ------
+        ProblemError : a recording runs; there is no live source; the file exists
+        OSError : it cannot be written
+        """
+        if self.records:
+            raise ProblemError("a recording runs already: stop it first")
+        live, source = self.needed_live(), self.needed_source()
+        path = self.folder.file(f"{name}.mcap")
+        if path.exists():
+            raise refused("name", f": {path.name} exists already; choose another name")
+        await self.recorder.begin(source, path, label, length_s)
+
+        async def run() -> None:
+            await self.recorder.run(live, source)
+            await self.say(await self.recordings())
+            await self.say(self.recorder.message())
+
+        self.keep(asyncio.create_task(run()))
+
+    async def _mark(self, on: bool) -> bool:
+        if self.board.is_connected:
+            try:
+                await self.on_board(lambda: self.board.record(on))
+            except (OSError, _core.Error) as error:
+                await self.warn(f"register record: {error}")
+        return self.board.is_connected
+
     # ---------------------------------------------------------------------------------------------- the board
 
     async def connect(self, cable: Cable) -> None:
         """Use the board's serial line from now on."""
         self.board.connect(cable)
-        await self.say(self.hello())
+        for session in self.sessions:
+            await session.say(self.hello(session.follows))
         await self.prepare()
 
     async def prepare(self) -> None:
@@ -339,12 +376,13 @@ class Hub:
         """Send the counters, and read the board's line, whose greetings report resets."""
         while True:
             await asyncio.sleep(_COUNT_S)
-            if self.source is None or not self.sessions:
+            if not self.sessions:
                 continue
-            certain = self.registers_stated or self.board.known
-            frame_us = _core.registers_words(json.dumps(self.board.registers))[1] if certain else None
-            counters = self.source.counters(frame_us)
-            await self.say(f'{counters[:-1]},"viewers":{len(self.sessions)}}}')
+            for source in [*self._sources.values()]:
+                certain = source is self.source and (self.registers_stated or self.board.known)
+                frame_us = _core.registers_words(json.dumps(self.board.registers))[1] if certain else None
+                counters = source.counters(frame_us)
+                await self.say(f'{counters[:-1]},"viewers":{len(self.sessions)}}}', source)
             if self.board.is_connected and await in_thread(self.board.was_reset):
                 await self.forget_registers()
 
@@ -383,14 +421,17 @@ class Hub:
 
     # ---------------------------------------------------------------------------------------------- messages
 
-    def hello(self) -> dict[str, Any]:
-        """Return what the panel shows, sent again when any of it changes."""
-        nothing = dict.fromkeys(("array", "udp", "lines", "source", "frames", "readout"))
-        live = {**nothing, "sources": []} if self.source is None else self.source.about()
+    def hello(self, source: _core.PanelLive | None) -> dict[str, Any]:
+        """Return what a client that follows a source is shown, sent again when any of it changes."""
+        live: dict[str, Any] = dict.fromkeys(("array", "udp", "lines", "source", "sensor", "frames", "readout"))
+        live["sources"] = []
+        if source is not None:
+            of_all = self.needed_source().about()
+            live = source.about() | {key: of_all[key] for key in ("sources", "readout")}
         return {
             "type": "hello",
             "protocol": 1,
-            "live": self.source is not None,
+            "live": source is not None,
             "control": self.board.place,
             "folder": str(self.folder.path),
             "open": self.opened,
@@ -418,9 +459,9 @@ class Hub:
         fitting = list(fitting_presets(self.board.registers, array))
         return {"type": "presets", "built_in": fitting, "fields": fields_of_registers()}
 
-    def zeroed(self) -> dict[str, Any]:
-        """Return the taxels of the live source that were zeroed, each as it was last; sent when that has changed."""
-        zeroings = () if self._live is None else self._live.zeroed
+    def zeroed(self, source: _core.PanelLive | None) -> dict[str, Any]:
+        """Return the taxels of a live source that were zeroed, each as it was last; sent when that has changed."""
+        zeroings = () if self._live is None or source is not self.source else self._live.zeroed
         return {
             "type": "zeroed",
             "taxels": [{"taxel": (z.x, z.y), "t_us": z.t, "rest": z.rest, "before": z.before} for z in zeroings],

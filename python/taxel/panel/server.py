@@ -40,8 +40,8 @@ _MOST_CLIENTS = 64
 #: Time from one frame to the next, and without clients from one look at the source to the next, s.
 _FRAME_S, _IDLE_S = 1 / 60, 0.05
 
-#: A client that reads nothing of what waits for it within this time is disconnected, s.
-_READ_WITHIN_S = 5.0
+#: How often a client is asked whether it reads, and how long it may take to answer, s.
+_ASK_S, _ANSWER_S = 5.0, 10.0
 
 #: How long requests that run are waited for when the server ends, s.
 _REQUESTS_S = 2.0
@@ -167,8 +167,8 @@ class Server:
             compression=None,
             write_limit=_WRITE_LIMIT,
             max_size=MOST_BYTES,
-            ping_interval=10,
-            ping_timeout=20,
+            ping_interval=_ASK_S,
+            ping_timeout=_ANSWER_S,
             close_timeout=1,
             server_header=None,
             logger=_QUIET,
@@ -258,12 +258,7 @@ class Server:
             await asyncio.sleep(due - time.monotonic())
             await self._hub.tell()
             for session in list(self._hub.sessions):
-                waiting = session.waiting()
-                if waiting and session.unread_s(waiting, due) > _READ_WITHIN_S:
-                    session.abort()
-                elif session.credits and not waiting and not session.answers:
-                    with contextlib.suppress(ConnectionClosed):
-                        await session.send_frame()
+                await session.send_frame()
 
 
 def _answer(status: HTTPStatus, media: str = "text/plain", body: bytes = b"", *, with_body: bool = True) -> Response:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
 import math
 import time
@@ -12,17 +11,16 @@ from collections.abc import Coroutine
 from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import Meta, Struct
-from websockets.exceptions import ConnectionClosed
 
 from taxel import _core
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.device import ports
 from taxel.labels import Note
+from taxel.panel.client import Client
 from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
 from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
-from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
 from taxel.panel.regions import Drawn, Measure, Picture, RegionLoads, read_beside, regions_beside, write_beside
 from taxel.panel.shown_files import judged
@@ -43,8 +41,6 @@ _MOST_LAYOUT = 500_000
 #: A client with more refused requests than the first within the second is disconnected, s.
 _MOST_REFUSED, _REFUSED_WITHIN_S = 100, 10.0
 
-#: A client that does not read as many bytes that wait for it is disconnected.
-_MOST_WAITING = 1 << 21
 #: How long the lines of a sensor are looked at, s.
 _LOOK_S = 2.0
 
@@ -66,8 +62,8 @@ class Change(Struct, forbid_unknown_fields=True):
     new: Row | None = None
 
 
-class Session:
-    """Serve a client.
+class Session(Client):
+    """Answer the requests of a client.
 
     Parameters
     ----------
@@ -78,86 +74,28 @@ class Session:
     """
 
     def __init__(self, hub: Hub, connection: ServerConnection) -> None:
-        self._hub, self._connection = hub, connection
-        self.view = _core.PanelView(hub.source)
-        #: The recording that is shown; None: the live source.
-        self.shown: Shown | None = None
-        #: Frames that may be sent; none while a request is answered, so that a frame shows what was answered before it.
-        self.credits, self.answers = 0, False
-        self._advancing: asyncio.Task[None] | None = None
+        super().__init__(connection, hub.source)
+        self._hub = hub
         self._long: set[asyncio.Task[None]] = set()
         self._refusals: deque[float] = deque()
         #: What takes the newest changes of labels back, by the recording's name.
         self._changes: deque[tuple[str, tuple[Edit, ...]]] = deque(maxlen=_MOST_CHANGES)
-        self._unread = (0, 0.0)
-
-    # ---------------------------------------------------------------------------------------------- sending
 
     async def greet(self) -> None:
         """Say what the panel shows."""
         hub = self._hub
         await hub.prepare()
         for message in (
-            hub.hello(),
+            hub.hello(self.follows),
             hub.presets(),
             hub.registers(),
             hub.recorder.message(),
             await hub.recordings(),
-            hub.zeroed(),
+            hub.zeroed(self.follows),
         ):
             await self.say(message)
         for text in [] if hub.source is None else hub.source.latest_detections():
             await self.say(text)
-
-    async def say(self, message: dict[str, Any] | str) -> None:
-        """Send a message; a client that does not read is disconnected, and one that has left is no error."""
-        if self.waiting() > _MOST_WAITING:
-            return self.abort()
-        text = message if isinstance(message, str) else await text_of(message)
-        with contextlib.suppress(ConnectionClosed):
-            await self._connection.send(text)
-        return None
-
-    def waiting(self) -> int:
-        """Return how many bytes wait for the client."""
-        return self._connection.transport.get_write_buffer_size()
-
-    def unread_s(self, waiting: int, now: float) -> float:
-        """Return for how long the client has read nothing of what waits for it, s."""
-        before, since = self._unread
-        if before == 0 or waiting < before:
-            since = now
-        self._unread = (waiting, since)
-        return now - since
-
-    def abort(self) -> None:
-        """Disconnect the client at once."""
-        self._connection.transport.abort()
-
-    async def send_frame(self) -> None:
-        """Send a frame, if there is a new one; what takes long before it is done in another thread."""
-        self._unread = (0, 0.0)
-        made = self.view.frame()
-        if made is not None:
-            frame, texts = made
-            self.credits -= 1
-            await self._connection.send(frame)
-            for text in texts:
-                await self.say(text)
-        if self.view.moves() and self._advancing is None:
-            self._advancing = asyncio.create_task(self._advance())
-
-    async def _advance(self) -> None:
-        try:
-            if await in_thread(self.view.advance):
-                await self._say_transport()
-        finally:
-            self._advancing = None
-
-    async def _say_transport(self) -> None:
-        state, speed, t_us = self.view.transport()
-        source = None if self.shown is None else self.shown.name
-        await self.say({"type": "transport", "source": source, "state": state, "speed": speed, "t_us": t_us})
 
     # ---------------------------------------------------------------------------------------------- answering
 
@@ -175,10 +113,9 @@ class Session:
         work = self._carry_out(asked.method(self, **arguments), number, kind)
         if asked.is_long:
             task = asyncio.create_task(work)
-            # It goes on when the client has left.
-            for tasks in (self._long, self._hub.tasks):
-                tasks.add(task)
-                task.add_done_callback(tasks.discard)
+            self._long.add(task)
+            task.add_done_callback(self._long.discard)
+            self._hub.keep(task)
         else:
             self.answers = True
             await work
@@ -233,32 +170,43 @@ class Session:
     async def seek(self, t_us: Time) -> None:
         """Show this time: of the recording, or while live within the reach; stops playing."""
         await in_thread(self.view.seek, t_us)
-        await self._say_transport()
+        await self.say_transport()
 
     @request
     async def play(self, speed: Annotated[float, Meta(ge=0.001, le=100)] | None = None) -> None:
         """Play from here at this speed (board time over real time; the last one where left out)."""
         await in_thread(self.view.play, speed)
-        await self._say_transport()
+        await self.say_transport()
 
     @request
     async def pause(self) -> None:
         """Pause the view. Acquisition continues."""
         await in_thread(self.view.pause)
-        await self._say_transport()
+        await self.say_transport()
 
     @request
     async def step(self, frames: Annotated[int, whole(-1000, 1000)]) -> None:
         """Go forward or back (negative) by this number of time stamps with events; stops playing."""
         await in_thread(self.view.step, frames)
-        await self._say_transport()
+        await self.say_transport()
 
     @request
     async def live(self) -> None:
         """Follow the live source; leaves a recording."""
         await in_thread(self.view.follow)
         self.shown = None
-        await self._say_transport()
+        await self.say_transport()
+
+    @request
+    async def sensor(self, name: Annotated[str, line(200)]) -> None:
+        """Show this one of the live sources, as `hello` names them, in this view; `hello` of it follows.
+
+        Only the first is read out, and can be zeroed.
+        """
+        source = self._hub.source_of(name)
+        await in_thread(self.follow, source)
+        await self.say(self._hub.hello(source))
+        await self.say(self._hub.zeroed(source))
 
     @request
     async def open(self, name: Annotated[str, line(110)], trial: Annotated[str, line(255)] | None = None) -> None:
@@ -319,7 +267,7 @@ class Session:
         }
         await self.say(opened)
         await self.say(self._hub.labels.message(shown.name))
-        await self._say_transport()
+        await self.say_transport()
         if trouble is not None:
             await self.say({"type": "warning", "text": trouble})
 
@@ -331,23 +279,27 @@ class Session:
     @request
     async def overview(self) -> None:
         """Send `overview` of what this view shows: events and the greatest force over time, for the strip."""
-        if self.shown is not None:
-            await self.say(await in_thread(self.shown.recording.overview, self.shown.name))
-        elif self._hub.source is not None:
-            await self.say(await in_thread(self._hub.source.overview))
-        else:
-            raise ProblemError("nothing is shown: open a recording first")
+        source = self._source()
+        name = [] if self.shown is None else [self.shown.name]
+        await self.say(await in_thread(source.overview, *name))
 
     @long_request
     async def health(self) -> None:
         """Send `health` of what this view shows, by the rules of `taxel info`."""
-        if self.shown is None:
-            found = await in_thread(judged, await in_thread(self._hub.needed_source().activity))
-        elif (activity := await in_thread(self.shown.recording.activity)) is not None:
-            found = await in_thread(judged, activity)
+        shown = self.shown
+        activity = await in_thread(self._source().activity)
+        if activity is None and shown is not None:
+            found = await in_thread(self._hub.folder.files.judge, shown.path, shown.asked)
         else:
-            found = await in_thread(self._hub.folder.files.judge, self.shown.path, self.shown.asked)
-        await self.say({"type": "health", "source": None if self.shown is None else self.shown.name, **found})
+            found = await in_thread(judged, activity)
+        await self.say({"type": "health", "source": None if shown is None else shown.name, **found})
+
+    def _source(self) -> Any:
+        """Return the live source or the recording that this view shows."""
+        source = self.follows if self.shown is None else self.shown.recording
+        if source is None:
+            raise ProblemError("nothing is shown: open a recording first")
+        return source
 
     # ------------------------------------------------------------------------------------------ requests: the board
 
@@ -363,6 +315,8 @@ class Session:
 
         The recording notes the time and the rests before and after. `zeroed` follows.
         """
+        if self.follows is not self._hub.source:
+            raise ProblemError("zero: only the sensor that is read out can be zeroed, the first of them: show it")
         columns, rows = zip(*taxels, strict=True)
         await in_thread(self._hub.needed_live().zero, columns, rows)
 
@@ -440,7 +394,7 @@ class Session:
 
         `label` is written into the recording as a note without a time: it is about the whole, and is not an event.
         """
-        await self._hub.recorder.begin(name, label, length_s)
+        await self._hub.record(name, label, length_s)
 
     @request
     async def stop(self) -> None:
