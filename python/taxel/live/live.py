@@ -87,8 +87,8 @@ class Live(contextlib.AbstractContextManager["Live"]):
         is the standard input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a
         program passes to `sample`. They are read as tables are (commas, brackets, ``NAME:``, JSON, hex). Those of the
         first source, and with ``array=``, are frames: a line each, or ``frame_lines=16``, or up to an empty line
-        (``frame_end=blank``); without ``array=`` the shape is that of the readout, if it fits, or guessed (`read_as`).
-        ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B`` adds seconds and
+        (``frame_end=blank``), or from a line of text on (``frame_begin=Frame``, and ``frame_time=ms`` where it states
+        the time); without ``array=`` the shape is that of the readout, if it fits, or guessed (`read_as`). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B`` adds seconds and
         nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns, ``leave_out=A:B`` are those
         without values, ``unit=``, ``falls=`` (true, or the number that readings are subtracted from) and ``rate=``
         (frames a second; default: measured). Lines without an array of further sources, as of an IMU, are
