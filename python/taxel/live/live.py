@@ -86,13 +86,15 @@ class Live(contextlib.AbstractContextManager["Live"]):
         preset=NAME). Lines of numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-"
         is the standard input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a
         program passes to `sample`. They are read as tables are (commas, brackets, ``NAME:``, JSON, hex). Those of the
-        first source, and with ``array=``, are frames: a line each, or ``frame_lines=16``, or up to an empty line
-        (``frame_end=blank``), or from a line of text on (``frame_begin=Frame``, and ``frame_time=ms`` where it states
-        the time); without ``array=`` the shape is that of the readout, if it fits, or guessed (`read_as`). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B`` adds seconds and
-        nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns, ``leave_out=A:B`` are those
-        without values, ``unit=``, ``falls=`` (true, or the number that readings are subtracted from) and ``rate=``
-        (frames a second; default: measured). Lines without an array of further sources, as of an IMU, are
-        recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
+        first source, and with ``array=``, are frames: a line each, or ``frame_lines=16``, or up to an empty
+        line (``frame_end=blank``), or from a line of text on (``frame_begin=Frame``, and ``frame_time=ms``
+        where it states the time); without ``array=`` the shape is that of the readout, if it fits, or guessed
+        (`read_as`). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B``
+        adds seconds and nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns,
+        ``leave_out=A:B`` are those without values, ``unit=``, ``falls=`` (true, or the number that readings are
+        subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array of further
+        sources, as of an IMU, are recorded with the first source. "lsl:NAME" is a stream of the lab streaming
+        layer.
     first_line_s : float, 0 or more
         How long each source of lines may be silent before its first line, s. A source of which the array, the columns
         and the rate are stated may be silent longer: it starts without a line.
