@@ -6,11 +6,11 @@ import asyncio
 import contextlib
 from typing import TYPE_CHECKING, Any
 
+from msgspec.json import encode
 from websockets.exceptions import ConnectionClosed
 
 from taxel import _core
 from taxel.panel.folder import Shown
-from taxel.panel.messages import text_of
 from taxel.panel.threads import in_thread
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Client:
         """Send a message; a client that does not read is disconnected, and one that has left is no error."""
         if self.is_behind(_MOST_WAITING):
             return self._connection.transport.abort()
-        text = message if isinstance(message, str) else await text_of(message)
+        text = message if isinstance(message, str) else encode(message).decode()
         with contextlib.suppress(ConnectionClosed):
             await self._connection.send(text)
         return None

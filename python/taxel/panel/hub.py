@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from msgspec.json import encode
 
 from taxel import _core
 from taxel._base.errors import refused
@@ -25,7 +26,6 @@ from taxel.panel.board import Board
 from taxel.panel.client import Client
 from taxel.panel.folder import Folder
 from taxel.panel.labels import LabelTables
-from taxel.panel.messages import text_of
 from taxel.panel.recorder import Recorder
 from taxel.panel.shown_files import Opening
 from taxel.panel.threads import in_thread
@@ -142,7 +142,7 @@ class Hub:
 
     async def say(self, message: dict[str, Any] | str, source: _core.PanelLive | None = None) -> None:
         """Send a message to all clients, or to those that follow a source."""
-        text = message if isinstance(message, str) else await text_of(message)
+        text = message if isinstance(message, str) else encode(message).decode()
         for session in list(self.sessions):
             if source is None or session.follows is source:
                 await session.say(text)
@@ -406,7 +406,7 @@ class Hub:
 
     async def say_labels(self, name: str) -> None:
         """Send the labels of a recording to the clients that show it."""
-        text = await text_of(self.labels.message(name))
+        text = encode(self.labels.message(name)).decode()
         for session in list(self.sessions):
             if (self.recorder.file if session.shown is None else session.shown.name) == name:
                 await session.say(text)

@@ -376,7 +376,7 @@ def _contents(
     us = recording.times()[2]
     return {
         **recording.opened(),
-        "verdict": verdict,
+        "verdict": str(verdict),
         "pace": None,
         "has_roles": False,
         "registers": None if registers is None else registers._held,

@@ -1,4 +1,4 @@
-// The messages of the server (taxel/panel) as the page reads them, and the keys of its requests, which taxel/panel/session.py declares and documents.
+// The messages of the server (taxel/panel) as the page reads them, and the keys of its requests, which taxel/panel/requests.py declares and documents.
 
 /** A sensor. */
 export interface ArrayInfo {
