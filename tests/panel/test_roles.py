@@ -118,7 +118,7 @@ def test_a_live_source_reads_lines_as_they_were_looked_at(lines: list[str], chan
 def test_a_strangers_file_is_not_looked_at_while_a_recording_runs(tmp_path: Path) -> None:
     path = written(OPEN, tmp_path)
     with pytest.raises(ProblemError, match=r"while a recording runs"):
-        Folder(tmp_path, Opening(), None, lambda: True).look(path.name, None, {})
+        Folder(tmp_path, Opening(), lambda: True).look(path.name, None, {})
 
 
 def test_an_open_role_is_chosen_on_the_page(chromium: Any, tmp_path: Path) -> None:

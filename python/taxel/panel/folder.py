@@ -89,14 +89,12 @@ class Folder:
     path : Path
     opening : Opening
         How recordings are opened.
-    asked : str or None
-        The recording that is opened so also if it is a board's.
     records : function
         Whether a recording runs.
     """
 
-    def __init__(self, path: Path, opening: Opening, asked: str | None, records: Callable[[], bool]) -> None:
-        self.path, self._asked = path, asked
+    def __init__(self, path: Path, opening: Opening, records: Callable[[], bool]) -> None:
+        self.path = path
         self.files, self.looks = ShownFiles(opening, records), Looks()
         self._opening = opening
         self._locks: dict[Path, asyncio.Lock] = {}
@@ -206,17 +204,9 @@ class Folder:
 
     def _index(self, name: str, path: Path, trial: str | None) -> Shown:
         state = state_of(path)
-        viewed = self.files.read(path, trial, by_options=path.name == self._asked)
+        viewed = self.files.read(path, trial)
         frames = viewed.contents["frames"] or {}
-        return Shown(
-            name,
-            path,
-            trial,
-            frames.get("trial") or "",
-            viewed.recording,
-            viewed.contents,
-            state,
-        )
+        return Shown(name, path, trial, frames.get("trial") or "", viewed.recording, viewed.contents, state)
 
 
 def _begins_as_readout(file: Path) -> bool:

@@ -45,40 +45,23 @@ class Hub:
     Parameters
     ----------
     live : Live or None
-    registers_stated : bool
-        Whether somebody stated the board's registers.
     folder : Path
         That of the recordings.
-    opened : str or None
-        The recording to show first.
     opening : Opening
-        How recordings are opened.
+        How recordings are opened, and which first.
     cable : Cable or None
         The board's serial line, which `close` closes.
-    asked : bool
-        Whether `opened` is opened by `opening` also if it is a board's.
-    tables : str
-        The end of the names of the tables of labels.
     """
 
-    def __init__(
-        self,
-        live: Live | None,
-        registers_stated: bool,
-        folder: Path,
-        opened: str | None,
-        opening: Opening,
-        cable: Cable | None,
-        *,
-        asked: bool,
-        tables: str,
-    ) -> None:
+    def __init__(self, live: Live | None, folder: Path, opening: Opening, cable: Cable | None) -> None:
         self.sessions: list[Client] = []
         self._tasks: set[asyncio.Task[None]] = set()
-        self.opened, self.registers_stated = opened, registers_stated
+        self.opened = opening.first
+        #: Whether somebody stated the board's registers.
+        self.registers_stated = live is not None and live._registers_stated
         self.recorder = Recorder(self.say, self._mark)
-        self.folder = Folder(folder, opening, opened if asked else None, lambda: self.records)
-        self.labels = LabelTables(self.folder, opening, tables)
+        self.folder = Folder(folder, opening, lambda: self.records)
+        self.labels = LabelTables(self.folder, opening)
         self.training = Training(opening, self.folder.files)
         self.board, self._on_board = Board(cable), asyncio.Lock()
         #: The live sources that views have shown, by name; the first is read out.

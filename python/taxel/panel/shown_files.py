@@ -109,15 +109,22 @@ class Opening:
     options : FullReading
         Those by which it is opened so. Labels of numbered frames that have times by its `rate_hz` are in numbers of
         frames.
+    first : str, optional
+        The name of the recording that is shown first.
+    labels : str
+        The end of the names of the tables of labels: "notes" for NAME.notes.csv.
     """
 
-    opens: Callable[[Path], Sequence[Recording]] = FullReading().open_trials
+    opens: Callable[[Path], Sequence[Recording]] | None = None
     file: Path | None = None
     options: FullReading = field(default_factory=FullReading)
+    first: str | None = None
+    labels: str = "notes"
 
     def open(self, file: Path) -> Sequence[Recording]:
         """Open a file."""
-        return self.opens(file) if self.file in (None, file) else FullReading().open_trials(file)
+        opens = FullReading().open_trials if self.opens is None or self.file not in (None, file) else self.opens
+        return opens(file)
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""
@@ -231,18 +238,10 @@ class ShownFiles:
             raise ProblemError(f"{path.name}: contains no trial {trial}")
         return recordings[0 if trial is None else names.index(trial)], names
 
-    def read(self, path: Path, trial: str | None, *, by_options: bool) -> Viewed:
-        """Read a recording for its view.
-
-        Parameters
-        ----------
-        path : path
-        trial : str or None
-            Of a file with several; default: the first.
-        by_options : bool
-            Whether also a board's .mcap is read by the options of `Opening`, not as it is.
-        """
-        board = None if by_options else _board(path)
+    def read(self, path: Path, trial: str | None) -> Viewed:
+        """Read a recording for its view: of a file with several trials one of them, by default the first."""
+        # A board's .mcap is read as it is, but the one that is shown first by the options, if there are any.
+        board = None if self._opening.opens and path.name == self._opening.first else _board(path)
         if board is not None:
             return board
         recording, names = self.opened(path, trial)
