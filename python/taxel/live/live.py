@@ -31,9 +31,6 @@ from taxel.tare import Tare
 #: Prefix of the destinations of the lab streaming layer.
 _LSL = "lsl:"
 
-#: The largest column or row of any taxel.
-_MOST_INDEX = 2**16 - 1
-
 #: How long an iteration waits at a time, s.
 _WAIT_S = 0.5
 
@@ -172,9 +169,7 @@ class Live(contextlib.AbstractContextManager["Live"]):
         #: The unit of the values.
         self.unit: str = "ticks" if layout is None else layout[0]
         #: The length of frames of numbers, us; None of a board.
-        self.frame_us: float | None = None if layout is None else layout[2]
-        #: Whether the source states that unit, as a board does; else it is the readout's.
-        self._states_unit = layout is None or layout[1]
+        self.frame_us: float | None = None if layout is None else layout[1]
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
         #: How the lines that are read out were understood, if what they are was not stated; else "".
@@ -395,19 +390,10 @@ class Live(contextlib.AbstractContextManager["Live"]):
             that is being taken
         OSError : the disk is full
         """
-        columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
+        columns, rows = (numbers(name, value, np.uint16).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
-            raise refused(
-                "x",
-                f" has {counted(len(columns), 'column')}, but y has {counted(len(rows), 'row')}: must be as many rows "
-                "as columns",
-            )
-        for name, indices in (("x", columns), ("y", rows)):
-            if len(indices) and (indices.min() < 0 or indices.max() > _MOST_INDEX):
-                wrong = indices.min() if indices.min() < 0 else indices.max()
-                raise ProblemError(
-                    f"{name}: contains {wrong}; must be the {'column' if name == 'x' else 'row'} of a taxel"
-                )
+            counts = f"{counted(len(columns), 'column')}, but y has {counted(len(rows), 'row')}"
+            raise refused("x", f" has {counts}: must be as many rows as columns")
         return tuple(
             Zeroing(**zeroing) for zeroing in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True)))
         )

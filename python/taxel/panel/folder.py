@@ -191,22 +191,18 @@ class Folder:
         """
         path = self.file(name)
         async with self._locks.setdefault(path, asyncio.Lock()):
-            if (known := self._known(path, trial)) is not None:
+            known = self._open.get((path, trial))
+            if known is not None and known.state == state_of(path):
                 return known
             shown = await in_thread(self._index, name, path, trial)
             self._open = dict([*self._open.items()][-3:]) | {(path, trial): shown}
             return shown
 
-    def _known(self, path: Path, trial: str | None) -> Shown | None:
-        """Return a recording that was opened and is as it was."""
-        known = self._open.get((path, trial))
-        return None if known is None or known.state != state_of(path) else known
-
     def _index(self, name: str, path: Path, trial: str | None) -> Shown:
         state = state_of(path)
-        viewed = self.files.read(path, trial)
-        frames = viewed.contents["frames"] or {}
-        return Shown(name, path, trial, frames.get("trial") or "", viewed.recording, viewed.contents, state)
+        recording, contents = self.files.read(path, trial)
+        of_frames = contents["frames"] or {}
+        return Shown(name, path, trial, of_frames.get("trial") or "", recording, contents, state)
 
 
 def _begins_as_readout(file: Path) -> bool:

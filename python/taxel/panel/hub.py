@@ -179,8 +179,8 @@ class Hub:
         self._live, self._sources = live, {live.name: source}
         self._watch()
 
-    async def restart(self, change: Callable[[Live], Live]) -> None:
-        """Show the `Live` that a function makes of the one before.
+    async def restart(self, change: Callable[[Live], dict[str, Any]], *, keeps_places: bool = False) -> None:
+        """Show another `Live` with the options that a function of the one before changes.
 
         Raises
         ------
@@ -193,12 +193,19 @@ class Hub:
         if self._live._options.record is not None:
             raise ProblemError("a recording from this address is running; end it first")
 
-        def replaced() -> None:
+        def replace() -> None:
             with self._restarting:
                 assert self._live is not None
-                self._show_live(change(self._live))
+                before, changed = self._live, change(self._live)
+                # A serial line has one reader at a time.
+                before._pause() if keeps_places else before.stop()
+                try:
+                    self._show_live(before._again(**changed))
+                except Exception:
+                    self._show_live(_in_sight(before))
+                    raise
 
-        await in_thread(replaced)
+        await in_thread(replace)
         for session in self.sessions:
             session.follow(self.source)
         await self.say(self.hello(self.source))
@@ -211,31 +218,15 @@ class Hub:
         A tare is one board's: a readout that reads with one ends, unless the tare is taken afresh.
         """
 
-        def change(before: Live) -> Live:
+        def change(before: Live) -> dict[str, Any]:
             own = {"readout": None, "tare": None} if isinstance(before._options.tare, Tare) else {}
-            # A serial line has one reader at a time.
-            before.stop()
-            return self._replaced(before, port=None, host=None, sources=source, **own)
+            return {"port": None, "host": None, "sources": source, **own}
 
         await self.restart(change)
 
     async def read_nothing(self) -> None:
         """Receive nothing any more."""
         await self.read_source(_nothing_like(self.needed_live()))
-
-    def _replaced(self, before: Live, **changed: Any) -> Live:
-        """Return the `Live` in place of one that has ended; where it is refused, the sensor stays in sight."""
-        try:
-            return before._again(**changed)
-        except Exception:
-            try:
-                self._show_live(before._again())
-            except (OSError, _core.Error):
-                # It is not there any more.
-                before.stop()
-                nothing = {"sources": _nothing_like(before), "readout": None, "tare": None}
-                self._show_live(before._again(port=None, host=None, **nothing))
-            raise
 
     async def read_out(self, readout: Path, use: str) -> None:
         """Read the live source out with another readout: time, values and the past begin again.
@@ -247,16 +238,15 @@ class Hub:
         await self._agree()
 
     async def _begin_readout(self, loaded: Callable[[], Readout | PlainRule], **changed: Any) -> None:
-        def change(before: Live) -> Live:
+        def change(before: Live) -> dict[str, Any]:
             readout = loaded()
             tare = before.tare or (before._options.tare if before._options.readout is not None else None)
             if tare is None:
                 tare = _rest_of_held(before)
             held = {"registers": Registers._of(self.board.registers, before.array)} if self.board.known else {}
-            before._pause()
-            return self._replaced(before, readout=readout, tare=tare, **held, **changed)
+            return {"readout": readout, "tare": tare, **held, **changed}
 
-        await self.restart(change)
+        await self.restart(change, keeps_places=True)
 
     async def _agree(self) -> None:
         """Say once in what the board differs from the training's; read out above a raised noise floor."""
@@ -463,6 +453,16 @@ class Hub:
             ],
             "readouts": readouts,
         }
+
+
+def _in_sight(before: Live) -> Live:
+    """Return a `Live` like one that has ended, so that its sensor stays in sight where another is refused."""
+    try:
+        return before._again()
+    except (OSError, _core.Error):
+        # It is not there any more.
+        before.stop()
+        return before._again(port=None, host=None, sources=_nothing_like(before), readout=None, tare=None)
 
 
 def _nothing_like(live: Live) -> str:

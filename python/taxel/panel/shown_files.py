@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,18 +82,8 @@ class ReadFrames:
     number_us: int | None
 
 
-@dataclass(frozen=True)
-class Viewed:
-    """A recording for its view, and what the message `opened` says of it.
-
-    Parameters
-    ----------
-    recording : PanelRecording
-    contents : dict
-    """
-
-    recording: _core.PanelRecording
-    contents: dict[str, Any]
+#: A recording for its view, and what the message `opened` says of it.
+Viewed: TypeAlias = tuple[_core.PanelRecording, dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -246,11 +236,11 @@ class ShownFiles:
             return board
         recording, names = self.opened(path, trial)
         are_events = not recording.is_several and recording.has_events
-        viewed = _events(recording) if are_events else _frames(recording)
-        viewed.contents["has_roles"] = takes_layout(recording.path)
+        shown, contents = _events(recording) if are_events else _frames(recording)
+        contents["has_roles"] = takes_layout(recording.path)
         if not are_events:
-            viewed.contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
-        return viewed
+            contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
+        return shown, contents
 
     def judge(self, path: Path, trial: str | None) -> dict[str, Any]:
         """Return what `judged` does, of a recording of frames; its taxels are in the array that is shown."""
@@ -290,13 +280,9 @@ class ShownFiles:
 
 def _sources(recording: Recording) -> dict[str, Recording]:
     """Return the sensors of a recording of frames: its sources, or itself."""
-    several = recording.is_several
-    sensors = recording.sources if several else {recording.label or "board": recording}
-    return (
-        {n: sensor for n, sensor in sensors.items() if not sensor.has_events and not sensor.is_stream}
-        if several
-        else sensors
-    )
+    if not recording.is_several:
+        return {recording.label or "board": recording}
+    return {n: sensor for n, sensor in recording.sources.items() if not sensor.has_events and not sensor.is_stream}
 
 
 def _array_of(frames: dict[str, Frames]) -> tuple[Array, list[int]]:
@@ -325,7 +311,7 @@ def _board(path: Path) -> Viewed | None:
         registers=None if values is None else Registers._of_file(values, Array._from_geometry(header["array"])),
         zeroed=((each["x"], each["y"], each["t"], each["rest"], each["before"]) for _, each in remarks.zeroings),
     )
-    return Viewed(shown, contents | {"pace": pace})
+    return shown, contents | {"pace": pace}
 
 
 def _events(recording: Recording) -> Viewed:
@@ -348,7 +334,7 @@ def _events(recording: Recording) -> Viewed:
         registers=registers,
         zeroed=((each.x, each.y, each.t, each.rest, each.before) for each in recording.zeroings),
     )
-    return Viewed(shown, contents)
+    return shown, contents
 
 
 def _contents(
@@ -417,7 +403,7 @@ def _frames(recording: Recording) -> Viewed:
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
     read_frames = ReadFrames(array, parts, units.pop(), None if us == 1 else us)
     shown = _core.PanelRecording.of_frames(read_frames, recording.path.parent, available() // _MEMORY_SHARE)
-    return Viewed(shown, _contents(shown, _verdict(recording), sorted_notes, found))
+    return shown, _contents(shown, _verdict(recording), sorted_notes, found)
 
 
 def _labels_beside(recording: Recording, begin_us: int) -> set[tuple[int | None, str]]:
