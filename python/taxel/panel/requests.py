@@ -309,12 +309,7 @@ class Requests(Session):
 
     @long_request
     async def loads(
-        self,
-        regions: _Regions,
-        measure: Measure,
-        first: _Column,
-        count: Annotated[int, whole(1, _MOST_COLUMNS)],
-        column_us: Annotated[int, whole(1, 2**40)],
+        self, regions: _Regions, measure: Measure, first: _Column, count: _Count, column_us: _Width
     ) -> None:
         """Send `loads`: least and greatest of a measure of each region in columns of time; the first is `first`.
 
