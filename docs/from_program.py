@@ -26,7 +26,7 @@ from taxel._core import causes, registers_fields, registers_preset
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._commands import command as imported
 from taxel.cli.app import about, own_commands, rows
-from taxel.panel.session import REQUESTS
+from taxel.panel import requests
 from taxel.wire import PRESETS
 from taxel_studies import STUDIES
 from taxel_studies.claims import CLAIMS, ERRATA, Verdict, summed, verdicts
@@ -224,7 +224,7 @@ class Requests(FromProgram):
     def lines(self) -> list[str]:
         """Return a table, a row a request."""
         rows = []
-        for name, request in REQUESTS.items():
+        for name, request in requests.Requests.requests.items():
             keys = [
                 f"``{key.name}`` {described(key.type)}{'' if key.required else ', may be left out'}"
                 for key in msgspec.inspect.type_info(request.keys).fields

@@ -115,12 +115,10 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert np.array_equal(frames.t, t)
     assert np.array_equal(frames.values, values.astype(np.float32))
     assert (frames.unit, recording.frame_us) == (unit, live.frame_us)
-    assert summary.verdict.status == recording.verdict.status == "complete after arrival"
     assert summary.verdict == recording.verdict
-    # A busy machine may have been silent for a second meanwhile, which the verdict says too.
-    assert recording.verdict.startswith(
-        "nothing lost after arrival (lines are not numbered, so losses before arrival are unknown)"
-    )
+    # Stamps of 3 s arrive at once, but on a busy machine in seconds: then their clock is doubted.
+    assert not summary.verdict.lost
+    assert {*summary.verdict.damaged} <= {"drifts_from_arrival"}
     expected = run(detector, recording)
     assert len(expected) >= 5
     assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
@@ -210,6 +208,20 @@ def test_of_sensors_that_print_in_turn_each_ends_its_frames_and_lines_of_none_ar
     assert [*sources] == ["mat_left", "mat_right"]
     assert sources["mat_left"].frames().values.tolist() == [[[k, 2], [3, 4]] for k in range(50)]
     assert sources["mat_right"].frames().values.tolist() == [[[5, k], [7, 8]] for k in range(50)]
+
+
+def test_frames_begin_at_a_line_of_text_with_their_time(tmp_path: Path) -> None:
+    text = "3 4\n" + "".join(f"FRAME {k} ({20 * k} ms)\n{k} 2\n3 4\n" for k in range(40)) + "FRAME 40 (800 ms)\n1 2\n"
+    begin = text.replace("FRAME 7 (140 ms)\n7 2\n", "FRAME 7 (140 ms)\n")
+    with served(begin) as address:
+        source = f"lines+tcp:{address},array=2x2,frame_begin=FRAME,frame_time=ms"
+        with Live(sources=source, record=tmp_path / "a.mcap") as live:
+            until(lambda: live.counters["frames"] == 39)
+            summary = live.stop()
+    frames = taxel.open(tmp_path / "a.mcap").frames()
+    assert frames.t.tolist() == [20_000 * k for k in range(40) if k != 7]
+    assert frames.values[:, 0, 0].tolist() == [k for k in range(40) if k != 7]
+    assert summary.verdict.damaged == {"lines_that_could_not_be_read": 1}
 
 
 def test_a_layout_file_names_a_source(tmp_path: Path) -> None:

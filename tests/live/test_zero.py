@@ -99,7 +99,7 @@ def test_without_a_readout_it_is_kept_and_what_it_rested_at_before_is_unknown(tm
             ((0, 0), "taxel at row 0, column 0: its value is unknown, because it has sent no event"),
             ((4, 0), "taxel at row 0, column 4: does not exist in this array of 4 x 4 taxels"),
             (([1, 1], [2]), "x has 2 columns, but y has 1 row: must be as many"),
-            ((-1, 0), "x: contains -1; must be the column of a taxel"),
+            ((-1, 0), "x is -1: must be a whole number that fits"),
             (([1, 0], [2, 0]), "has sent no event so far"),
         ]:
             with pytest.raises(ProblemError, match=said):

@@ -14,7 +14,7 @@ import pytest
 from panel.protocol import SOON
 
 from taxel.panel import Panel
-from taxel.panel.session import REQUESTS
+from taxel.panel.requests import Requests
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "python/taxel/panel/web"
@@ -87,5 +87,5 @@ def test_the_page_knows_each_request_by_the_keys_that_its_method_declares() -> N
         known[kind] = {key: bool(may_lack) for key, may_lack in keys if key not in ("type", "id")}
     assert known == {
         name: {one.name: not one.required for one in msgspec.structs.fields(request.keys)}
-        for name, request in REQUESTS.items()
+        for name, request in Requests.requests.items()
     }

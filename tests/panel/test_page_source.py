@@ -150,3 +150,18 @@ def test_what_a_server_prints_is_chosen_by_columns_on_a_phone(chromium: Any, tmp
         page.locator("#sensor-place").fill(f"lines:{tmp_path.parent / 'elsewhere.csv'}")
         page.locator("#sensor-form button.primary").click()
         shows(page, "sensor-about", "must be a file of the folder")
+
+
+def test_each_of_several_live_sensors_is_shown_by_the_menu(chromium: Any, tmp_path: Path) -> None:
+    with followed(chromium, tmp_path, 0, sources=["mat=given,array=4x2,rate=50,unit=N"]) as (live, page):
+        shows(page, "source", "64 × 64$")
+        page.locator("#parts").select_option("mat")
+        shows(page, "source", "4 × 2$")
+        for k in range(20):
+            live.sample("mat", [0, 0, 0, 0, 0, 0, 0, 5.0 * (k % 2)])
+        shows(page, "pressure-title", "Force")
+        shows(page, "pressure-top", "N")
+        assert page.locator("#zero-all").is_hidden()
+        page.locator("#parts").select_option("board")
+        shows(page, "source", "64 × 64$")
+        shows(page, "pressure-title", "Pressure")

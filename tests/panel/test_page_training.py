@@ -80,9 +80,10 @@ def test_play_label_train_and_watch_the_new_readout(
         until(lambda: page.locator("#detection-list li").count() > 0, "its detections are listed")
         assert page.locator("#detection-marks span").count() > 0
         page.locator("#use").select_option("neuron")
-        found = [row.split() for row in page.locator("#detection-list li").all_inner_texts()]
+        cells = "all => all.map(row => ['.what', '.when'].map(cell => row.querySelector(cell).textContent))"
+        found = page.locator("#detection-list li").evaluate_all(cells)
         wanted = sorted((t_us / 1e6, label) for label, times in truth.items() for t_us in times)
-        heard = [(float(t), label) for label, t, *_ in found]
+        heard = [(float(t.split()[0]), label) for label, t in found]
         missed = [(t, label) for t, label in wanted if not any(abs(t - s) < 0.05 and label == of for s, of in heard)]
         # Labels by click are a pixel late or early, for which a frame more may count.
         assert (missed, len(heard) - len(wanted)) in (([], 0), ([], 1))

@@ -111,6 +111,32 @@ def test_a_recording_of_the_panel_holds_all_sources_of_the_board(tmp_path):
     assert recording.sources["imu"].frames().values.reshape(-1).tolist() == [0.5, 1.5]
 
 
+def test_each_of_several_live_sensors_is_shown_to_who_chose_it(tmp_path):
+    given = ["left=given,array=2x3,rate=50,unit=kPa", "right=given,array=4x2,rate=50,unit=N", "imu=given,columns=ax:ay"]
+    with (
+        Live(sources=given, record_later=True) as live,
+        Panel(live, folder=tmp_path) as panel,
+        Client(panel) as page,
+        Client(panel) as other,
+    ):
+        assert other.until("hello")["sources"] == ["left", "right", "imu"]
+        for name, rows, columns in (("right", 4, 2), ("imu", 1, 2), ("left", 2, 3)):
+            assert page.ask("sensor", name=name)["type"] == "done"
+            hello = page.since_asked("hello", sensor=name)
+            assert (hello["array"]["rows"], hello["array"]["columns"]) == (rows, columns)
+            values = np.arange(rows * columns) + 1.0
+            live.sample(name, values)
+            while not (about := page.until("hello", sensor=name)["frames"]):
+                pass
+            page.send(type="credit", n=1)
+            page.until("counters", frames_per_s=0.0)
+            step = about["step"]
+            assert np.allclose((section(page.frames[-1], 0, "<u2") - about["zero"]) * step, values, atol=step)
+            assert page.ask("zero", taxels=[[0, 0]])["type"] == ("done" if name == "left" else "refused")
+        assert page.ask("sensor", name="none")["type"] == "refused"
+        assert {message["sensor"] for message in other.said if message["type"] == "hello"} == {"left"}
+
+
 def test_a_recording_alone_is_viewed_and_the_address_names_it(tmp_path):
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "two.mcap")

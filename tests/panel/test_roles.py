@@ -89,6 +89,8 @@ def test_a_layout_is_written_over_another_only_if_asked(tmp_path: Path) -> None:
         ([f"{20 * k},{k % 7},{k % 5},{k % 9}" for k in range(60)], [{"time_column": 0, "left": [1]}]),
         ([f"{k % 7},{k % 5},{k % 9},1" for k in range(60)], [{"left": [4]}, {"rows": 3}]),
         (["", *["1,2,3", "4,5,6", ""] * 20], [{"rows": 3}, {"unit": "N", "falls": True}]),
+        ([line for k in range(30) for line in (f"FRAME {k}", "1,2,3", f"4,5,{k % 9}")], [{}, {"rows": 2}]),
+        ([line for k in range(30) for line in (f"at {20 * k} ms", "1 2", "3 4", f"4 {k % 9}", "")], [{"unit": "N"}]),
         ([f'{{"t": {20 * k}, "p": [1, {k % 9}], "battery": 3}}' for k in range(60)], [{"time_unit": "us"}]),
     ],
 )
@@ -104,15 +106,19 @@ def test_a_live_source_reads_lines_as_they_were_looked_at(lines: list[str], chan
     size = None if stated.array is None else stated.array.taxels
     live = form_of_lines(lines, stated.printed, size, lambda *_: "")
     assert live is not None
-    assert (live.taxels, live.clocks, live.table.frame_end) == (form.taxels, form.clocks, form.table.frame_end)
+    assert (live.taxels, live.clocks) == (form.taxels, form.clocks)
+    keys = ("frame_end", "frame_begin", "frame_time")
+    assert [getattr(live.table, key) for key in keys] == [getattr(form.table, key) for key in keys]
     assert (stated.printed.baud, stated.unit) == (9600, full.unit)
-    assert (None if stated.array is None else stated.array.shape[0]) == full.rows
+    assert (None if stated.array is None else stated.array.shape[0]) == (
+        full.rows or (form.lines if form.lines > 1 else None)
+    )
 
 
 def test_a_strangers_file_is_not_looked_at_while_a_recording_runs(tmp_path: Path) -> None:
     path = written(OPEN, tmp_path)
     with pytest.raises(ProblemError, match=r"while a recording runs"):
-        Folder(tmp_path, Opening(), None, lambda: True).look(path.name, None, {})
+        Folder(tmp_path, Opening(), lambda: True).look(path.name, None, {})
 
 
 def test_an_open_role_is_chosen_on_the_page(chromium: Any, tmp_path: Path) -> None:

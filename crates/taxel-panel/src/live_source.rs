@@ -183,6 +183,7 @@ impl LiveSource {
             "udp": udp,
             "lines": lines,
             "source": source,
+            "sensor": options.name,
             "sources": self.handle.source_names(),
             "frames": frames,
             "readout": self.labels,

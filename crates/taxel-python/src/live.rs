@@ -152,12 +152,10 @@ impl Live {
         })
     }
 
-    /// Unit of the frames of numbers that it receives, whether the source states it, and their length, us; None of a board.
-    fn frame_layout(&self, py: Python<'_>) -> PyResult<Option<(String, bool, f64)>> {
+    /// Unit of the frames of numbers that it receives, and their length, us; None of a board.
+    fn frame_layout(&self, py: Python<'_>) -> PyResult<Option<(String, f64)>> {
         self.with(py, |pipeline| {
-            Ok(pipeline
-                .layout()
-                .map(|layout| (layout.unit.clone(), layout.unit_is_stated, layout.frame_us.unwrap_or_default())))
+            Ok(pipeline.layout().map(|layout| (layout.unit.clone(), layout.frame_us.unwrap_or_default())))
         })
     }
 

@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use taxel_core::Array;
 use taxel_core::rest::Value as _;
 use taxel_core::wire::Registers;
+use taxel_core::{Array, problem};
 use taxel_live::clock::BoardClock;
 use taxel_live::pipeline::Record;
 use taxel_live::recording::{Compression, Condition};
@@ -53,6 +53,12 @@ impl PanelLive {
         let registers: Option<Registers> = registers.map(|text| parsed("registers", text)).transpose()?;
         let handle = live.handle(py)?;
         enter(py, |_| LiveSource::begin(handle, registers)).map(Self)
+    }
+
+    /// Begins to receive from another source of the same pipeline.
+    fn of_source(&self, py: Python<'_>, name: &str) -> PyResult<Self> {
+        let found = self.0.handle.of_source(name).ok_or_else(|| problem!("name"; " is {name:?}: no such source"));
+        enter(py, |_| LiveSource::begin(found?, None)).map(Self)
     }
 
     /// What is said of it at first, and when `news` says so again.

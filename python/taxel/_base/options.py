@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import functools
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import field, fields
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
+#: A parameter in a docstring: its name and its description.
+_PARAMETER = re.compile(r"^(\w+) : .*((?:\n    .+)+)", re.MULTILINE)
 _P = ParamSpec("_P")
 _First = TypeVar("_First")
 _Options = TypeVar("_Options")
 _Result = TypeVar("_Result")
 
 
-def option(default: Any, about: str, *, least: float | None = None, most: float | None = None, **typed: str) -> Any:
-    """Return a field with its default, its description, the range of its values, and how it is `typed`."""
-    return field(default=default, metadata={"help": about, "min": least, "max": most, "typed": typed})
+def option(default: Any, *, least: float | None = None, most: float | None = None, **typed: str) -> Any:
+    """Return a field with its default, the range of its values, and how it is `typed`; its class describes it."""
+    return field(default=default, metadata={"min": least, "max": most, "typed": typed})
 
 
 def about(options: Any, name: str) -> dict[str, Any]:
     """Return the description and the range of an option, for the command line: help, min, max."""
-    metadata = {entry.name: entry.metadata for entry in fields(options)}[name]
-    return {key: value for key, value in metadata.items() if value is not None and key != "typed"}
+    [metadata] = [entry.metadata for entry in fields(options) if entry.name == name]
+    described = dict(_PARAMETER.findall(inspect.getdoc(options) or ""))
+    limits = {key: metadata[key] for key in ("min", "max") if metadata[key] is not None}
+    return {"help": " ".join(described.get(name, "").split()), **limits}
 
 
 def with_fields_of(

@@ -43,7 +43,6 @@ _TYPES = {"int": int, "float": float, "bool": bool, "str": str}
 def _typed(field: Field[Any]) -> tuple[str, Any, Any]:
     """Return an option of `Live` as a field that the command line types: its name, kind and default."""
     words, kind, described = field.metadata["typed"], str(field.type), about(LiveOptions, field.name)
-    help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
     plain = kind.removesuffix(" | None")
     default = field.default if plain in _TYPES else None
     read: Any = _TYPES.get(plain, str)
@@ -56,7 +55,7 @@ def _typed(field: Field[Any]) -> tuple[str, Any, Any]:
     option = Parameter(
         name=words.get("flag", "--" + field.name.replace("_", "-")),
         metavar=words.get("metavar"),
-        help=help_.replace("`taxel.wire.PRESETS`", QUOTED_PRESETS),
+        help=described["help"].replace("`taxel.wire.PRESETS`", QUOTED_PRESETS),
         validator=Limits(described.get("min"), described.get("max")),
     )
     return field.name, Annotated[read, option], default

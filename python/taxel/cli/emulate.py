@@ -32,6 +32,7 @@ from taxel.simulate import emulate as run
 from taxel.simulate.board import fitting
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.options import EmulateOptions
+from taxel.wire.registers import QUOTED_PRESETS
 
 app = App(name="emulate")
 
@@ -45,7 +46,8 @@ def _option(name: str, options: type = EmulateOptions) -> Any:
     """Return the option of the command line that sets an option of `emulate`: its text and range."""
     described = about(options, name)
     limits = Limits(described.get("min"), described.get("max"))
-    return Parameter(help=described["help"], validator=limits)
+    help_ = described["help"].replace("`taxel.wire.PRESETS`", QUOTED_PRESETS)
+    return Parameter(help=help_, validator=limits)
 
 
 def _several(name: str, flag: str, value: str) -> Any:

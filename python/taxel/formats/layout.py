@@ -222,6 +222,8 @@ class PrintedFrames:
         Number of lines of a frame.
     frame_end : {"blank"}, optional
         An empty line ends a frame.
+    frame_begin, frame_time : str, optional
+        As of `Table`: how the line of text above each frame begins, and the unit of the time in it.
 
     Raises
     ------
@@ -236,9 +238,11 @@ class PrintedFrames:
     by: str | int | None = None
     frame_lines: int | None = None
     frame_end: str | None = None
+    frame_begin: str | None = None
+    frame_time: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("place", "time"):
+        for name in ("place", "time", "frame_begin"):
             if getattr(self, name) is not None and "," in text(name, getattr(self, name)):
                 raise refused(name, f" is {shown(getattr(self, name))}: must not contain a comma")
         if self.baud is not None:
@@ -257,6 +261,8 @@ class PrintedFrames:
             time_unit=unit or "s",
             frame_lines=self.frame_lines,
             frame_end=self.frame_end,
+            frame_begin=self.frame_begin,
+            frame_time=self.frame_time,
         )
         return Layout(Path(self.place), source=self, table=table, stated=frozenset(["time_unit"] if unit else []))
 

@@ -47,15 +47,17 @@ def form_of_lines(
     ProblemError : columns that are not there, or lines that can be read in two ways, or are of several sensors
     FormatError : another number of columns than is stated
     """
+    if (begin := stated.frame_begin) is not None:
+        lines = ["" if line.lstrip().startswith(begin) else line for line in lines]
     draft = _reading_of_lines(lines, stated, size)
     if draft is None:
         return None
     fit, names = draft.fit, draft.names
     left = {*draft.stated_left, *(places_of(names, "by", stated.by) if stated.by else ())}
     times = places_of(names, "time", draft.table.time_column) if draft.table.time_column else ()
-    of_line = None if size is None else size // (stated.frame_lines or 1)
+    of_line = None if size is None or begin is not None else size // (stated.frame_lines or 1)
     is_whole = fit.count - len({*left, *times}) == of_line and not any(map(time_unit, names))
-    if not (is_whole or draft.is_stated("frame_lines", "frame_end")):
+    if not (is_whole or draft.is_stated("frame_lines", "frame_end", "frame_begin")):
         find_blanks(draft, lines)
     time = None if not times and (is_whole or stated.time) else time_of(draft, by_name=not are_taxels)
     if time is not None:
@@ -111,7 +113,7 @@ def stated_count(stated: PrintedFrames, size: int | None) -> int | None:
     """Return how many columns lines have, if what is stated of them says it."""
     if stated.columns:
         return len(stated.columns)
-    if size is None or stated.frame_end is not None:
+    if size is None or stated.frame_end is not None or stated.frame_begin is not None:
         return None
     clocks = 0 if stated.time in (None, "0") else 2 if "+" in (stated.time or "") else 1
     return size // (stated.frame_lines or 1) + clocks + len(stated.leave_out) + (stated.by is not None)

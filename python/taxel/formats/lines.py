@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -43,6 +44,7 @@ _NUMBERS = {
     ".": re.compile(rf"{_SIGN}(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII),
     ",": re.compile(rf"{_SIGN}(?:\d+(?:,\d+)?|,\d+)(?:[eE][+-]?\d+)?", re.ASCII),
 }
+_LAST = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
 _ARROW = re.compile(r"[-=~]+>|:=|(?<=\d):(?=\s)")
 _MARKS = str.maketrans(dict.fromkeys("[](){}<>|\"'", " "))
 _BETWEEN = {".": re.compile(r"[\s,;]+"), ",": re.compile(r"[\s;]+")}
@@ -137,6 +139,18 @@ def number_of(cell: str, decimal: str, thousands: str | None) -> float:
     """
     bare = (cell if thousands is None else cell.replace(thousands, "")).replace(_MINUS, "-")
     return float(bare.replace(",", ".") if decimal == "," else bare)
+
+
+def last_number(text: str) -> float:
+    """Return the last number in a text; NaN without one.
+
+    Examples
+    --------
+    >>> last_number("Frame 1 (2.5 ms)"), last_number("Frame")
+    (2.5, nan)
+    """
+    found = _LAST.findall(text)
+    return float(found[-1].replace(",", ".")) if found else math.nan
 
 
 def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: str = ".") -> Line | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from array import array
 from collections import Counter, deque
@@ -25,7 +24,17 @@ from taxel.events import Events
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout
-from taxel.formats.lines import MISSING, OTHER, USUAL, WITH_TEXT, WITH_THOUSANDS, is_number, odd_lines, read_line
+from taxel.formats.lines import (
+    MISSING,
+    OTHER,
+    USUAL,
+    WITH_TEXT,
+    WITH_THOUSANDS,
+    is_number,
+    last_number,
+    odd_lines,
+    read_line,
+)
 from taxel.formats.opened import readers_of, sources_of
 from taxel.formats.parts import parts_of
 from taxel.formats.table_columns import EVENT_COLUMNS
@@ -38,7 +47,6 @@ from taxel.reading import InMemory
 ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
 _CELLS = 1 << 21
-_NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
 #: Kinds of odd lines: with a reading that is missing, and with too few cells, as the last line where a text is cut off.
 MISSING_ONE, TOO_FEW, CUT_OFF = f"{WITH_TEXT}, which is missing", "with too few cells", "cut off at the end"
 #: Lines of events are swapped by at most so much, us.
@@ -307,8 +315,7 @@ def _line_by_line(text: Text, form: Form) -> Rows:
         if is_begin or not line.strip(f"\t ;,{how.separator}"):
             waiting = True
             if is_begin and how.frame_time is not None:
-                found = _NUMBER.findall(line)
-                rows.frame_times.append(float(found[-1].replace(",", ".")) if found else np.nan)
+                rows.frame_times.append(last_number(line))
             continue
         read, odd = form.values(line)
         if waiting and how.has_lines:

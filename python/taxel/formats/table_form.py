@@ -102,7 +102,7 @@ def _found(text: Text, layout: Layout) -> tuple[Form, Layout]:
         right = "save them whole, as numpy.set_printoptions(threshold=sys.maxsize) prints them"
         raise unreadable(f"an array is cut by ..., and its values are lost; {right}", text.path, line=cut + 1)
     draft = _draft(text, layout, shown_lines)
-    _frames(draft, lines, is_begin, begin, [unit for unit in units if unit])
+    _frames(draft, shown_lines, is_begin, begin, [unit for unit in units if unit])
     time = time_of(draft)
     _ask_of_thousands(draft, time)
     # Lines of a live source arrive at a time.
@@ -390,15 +390,15 @@ def find_blanks(draft: Draft, lines: Sequence[str]) -> None:
 
 
 def _frames(draft: Draft, lines: Sequence[str], is_begin: Sequence[bool], begin: str, units: Sequence[str]) -> None:
-    """Say how many lines a frame has: those between lines of text, or between empty lines."""
+    """Say how many lines a frame has: those between lines of text, which are empty here, or between empty lines."""
     if draft.is_stated("frame_lines", "frame_end", "frame_begin"):
-        is_blank = draft.table.frame_end is not None
-        draft.lines = _lines_between_blanks(draft, lines) if is_blank else draft.lines
+        is_between = draft.table.frame_lines is None
+        draft.lines = _lines_between_blanks(draft, lines) if is_between else draft.lines
         return
     if begin:
         first = min(is_begin.index(True), draft.fit.first)
         draft.set(frame_begin=begin, frame_time=next(iter(units), None), skip_lines=first)
-        draft.lines = 0
+        draft.lines = _lines_between_blanks(draft, lines)
         draft.said.append(f"frames begin at lines {begin!r}")
         if len(units) > 1:
             draft.ask("the unit of the time", "frame_time", {unit: {"frame_time": unit} for unit in units})

@@ -14,7 +14,8 @@ from taxel._base.text_lines import ArrivedLine
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.formats.form import Form
-from taxel.formats.lines import is_number
+from taxel.formats.lines import is_number, last_number
+from taxel.formats.times import UNITS_US
 
 __all__ = ["LineFrames", "PassedLines", "array_of", "row_of"]
 
@@ -35,6 +36,7 @@ class PassedLines:
     strange: int = 0
     unread: list[tuple[int, str]] = field(default_factory=list)
     unfinished: int = 0
+    trouble: str | None = None
 
     def arrays(self, turned: float | None) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Return arrivals, stamps and all values one after the other, those of readings that fall turned."""
@@ -65,6 +67,8 @@ class LineFrames:
         self.form = form
         # A counter that wraps is known by its whole numbers: in its own unit they stay as they are.
         self._clocks = tuple((k, unit / stamp_us) for k, unit in form.clocks)
+        #: The unit of times in lines that begin frames, 0 without them.
+        self._begin_unit = 0.0 if form.table.frame_time is None else UNITS_US[form.table.frame_time] / stamp_us
         #: Number of values of a frame.
         self.size = size
         self._takes_all = form.taxels == tuple(range(len(form.names)))
@@ -92,10 +96,14 @@ class LineFrames:
 
     def push(self, line: ArrivedLine) -> None:
         """Take the next line."""
-        text = line.text.strip()
+        text, begin = line.text.strip(), self.form.table.frame_begin
+        if begin is not None and text.startswith(begin):
+            self._end_at_text()
+            self._stamp = self._begin_unit * last_number(text)
+            return
         if not text:
             if self.form.table.frame_end:
-                self._end_at_blank()
+                self._end_at_text()
             return
         if text.startswith("#"):
             return
@@ -124,7 +132,7 @@ class LineFrames:
     def end(self) -> None:
         """End the last frame, which no empty line may follow."""
         if self.form.table.frame_end:
-            self._end_at_blank()
+            self._end_at_text()
 
     def restart(self) -> None:
         """Handle an interruption: the next line begins a frame."""
@@ -138,14 +146,14 @@ class LineFrames:
             self._stamp = sum(values[k] * scale for k, scale in self._clocks)
             self._end_frame(row, line.at_ns)
             return
-        if not self._open:
+        if not self._open and self._clocks:
             self._stamp = sum(values[k] * scale for k, scale in self._clocks)
         self._open.append(line)
         self._values += row
         if self.form.table.frame_end:
             if len(self._values) > self.size:
                 self._discard()
-        elif len(self._open) == self.form.lines:
+        elif len(self._values) == self.size:
             self._end_open()
 
     def _end_open(self) -> None:
@@ -153,8 +161,8 @@ class LineFrames:
         self._open, self._values, self._is_whole = [], [], True
         self._end_frame(values, at_ns)
 
-    def _end_at_blank(self) -> None:
-        """End a frame at an empty line; one that lacks lines is left out, and its lines are counted."""
+    def _end_at_text(self) -> None:
+        """End a frame at an empty line, or at one of text; lines of one that lacks some are counted."""
         if self._open and len(self._values) == self.size:
             self._end_open()
             return
@@ -163,11 +171,12 @@ class LineFrames:
 
     def _end_frame(self, values: Sequence[float], at_ns: int) -> None:
         passed = self.passed
-        if self.form.clocks:
+        if self._clocks or self._begin_unit:
             stamp = self._stamp
             if self._last_stamp is not None and stamp <= self._last_stamp:
                 columns = "+".join(str(k + 1) for k, _ in self.form.clocks)
-                self._count("repeated_stamps", f"{stamp:.17g} in column {columns}")
+                where = f"column {columns}" if columns else f"a line {self.form.table.frame_begin}"
+                self._count("repeated_stamps", f"{stamp:.17g} in {where}")
             self._last_stamp = stamp
             passed.stamps.append(stamp)
         passed.arrived_ns.append(at_ns)
@@ -228,7 +237,8 @@ def array_of(form: Form, stated: Array | None, readout: Array | None, name: str)
         _check_filled(form, stated)
         return stated, (), ""
     if not lines:
-        raise ProblemError("frame_end=blank: add array=ROWSxCOLUMNS")
+        key = "frame_begin" if form.table.frame_begin else "frame_end=blank"
+        raise ProblemError(f"{key}: add array=ROWSxCOLUMNS")
     if readout is not None and readout.taxels == lines * count:
         return readout, (), ""
     if lines > 1:
@@ -248,7 +258,7 @@ def _check_filled(form: Form, array: Array) -> None:
         size += f", {form.lines} lines per frame"
     if form.table.frame_end:
         size += ", an empty line after each frame"
-    fits = frame % n == 0 if form.table.frame_end else form.lines * n == frame
+    fits = form.lines * n == frame if form.lines else frame % n == 0
     if not fits:
         several = frame // n
         advice = ""

@@ -36,6 +36,8 @@ class LineShape:
     stated : StatedSource
     place : str
         Where the lines come from, for people.
+    name : str
+        That of the source.
     is_row : bool
         Whether they are a row of quantities, as of an IMU, whose rate need not be known; else frames of a sensor.
     waited : bool
@@ -54,8 +56,11 @@ class LineShape:
         How the lines are read, for people.
     """
 
-    def __init__(self, stated: StatedSource, place: str, *, is_row: bool, waited: bool, readout: Array | None) -> None:
-        self._stated, self._place, self._is_row, self._waited, self._readout = stated, place, is_row, waited, readout
+    def __init__(
+        self, stated: StatedSource, place: str, name: str, *, is_row: bool, waited: bool, readout: Array | None
+    ) -> None:
+        self._stated, self._place, self._name = stated, place, name
+        self._is_row, self._waited, self._readout = is_row, waited, readout
         self.array = stated.array
         self.names: tuple[str, ...] = ()
         self.frame_us = 0.0 if stated.rate_hz is None else 1e6 / stated.rate_hz
@@ -173,10 +178,10 @@ class LineShape:
         """
         guess = ""
         if self._is_row:
-            self.array, self.names = row_of(form, self._stated.called)
+            self.array, self.names = row_of(form, self._name)
         else:
             try:
-                self.array, self.names, guess = array_of(form, self.array, self._readout, self._stated.called)
+                self.array, self.names, guess = array_of(form, self.array, self._readout, self._name)
             except ProblemError as error:
                 raise self._refused(f": {first_line(error)}") from None
         if guess or not form.clocks:

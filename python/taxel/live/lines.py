@@ -6,7 +6,6 @@ import re
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted
@@ -17,21 +16,21 @@ from taxel.formats.lines import is_number
 from taxel.labels import source_of
 from taxel.live.line_frames import LineFrames
 from taxel.live.line_input import LineInput
-from taxel.live.line_parts import PartOfInput, parts_of_input
 from taxel.live.line_shape import LineShape, numbers_of, texts_of
+from taxel.live.sensor_lines import SensorLines
 from taxel.live.stated_source import StatedSource
 
 __all__ = ["Lines", "first_lines"]
 
 #: So many lines show what they are, or those of so long after the first, s.
 _LINES, _MEASURE_S = 33, 1.0
-#: How long the columns may be unknown after the first line, and the lines that are kept then.
-_WITHIN_S, _KEPT = 3.0, 256
+#: How long the columns may be unknown after the first line, s, and so many lines are looked at.
+_WITHIN_S, _LOOKED_AT = 3.0, 256
 _BETWEEN = re.compile(r"[,;\s]+")
 
 
 class Lines:
-    """Read a source of lines of numbers, or what a program passes.
+    """Read a place of lines of numbers, or what a program passes.
 
     Parameters
     ----------
@@ -41,13 +40,11 @@ class Lines:
         not stated to be a sensor.
     readout : Array, optional
         The sensor of the readout.
-    part : PartOfInput, optional
-        What reads the lines of one sensor, where several print to one place in turn.
 
     Attributes
     ----------
-    others : list of Lines
-        Those of the further sensors that print to its place, once they are found.
+    sensors : list of SensorLines
+        Those that print to the place; once several are found that do so in turn, each of them.
 
     Raises
     ------
@@ -55,38 +52,22 @@ class Lines:
     ProblemError : it is not a place of lines
     """
 
-    def __init__(
-        self,
-        stated: StatedSource,
-        *,
-        is_read_out: bool,
-        readout: Array | None = None,
-        part: PartOfInput | None = None,
-    ) -> None:
-        self.stated, self.name, self.others = stated, stated.called, list[Lines]()
-        self._input: LineInput | PartOfInput | None = part
-        if part is not None:
-            self._take(part)
-        elif stated.kind == "lines":
+    def __init__(self, stated: StatedSource, *, is_read_out: bool, readout: Array | None = None) -> None:
+        self.stated, self._readout = stated, readout
+        self._is_row = not (is_read_out or stated.are_frames)
+        self._input: LineInput | None = None
+        if stated.kind == "lines":
             baud = stated.printed.baud
             self._input = LineInput(stated.place if baud is None else f"{stated.place},baud={baud}")
         self.place = "a program" if self._input is None else self._input.place
-        is_row = not (is_read_out or stated.are_frames)
-        waited = self._input is not None and self._input.is_file
-        #: What the lines are.
-        self.shape = LineShape(stated, self.place, is_row=is_row, waited=waited, readout=readout)
-        self._frames: LineFrames | None = None
-        #: As is stated, before lines have shown their separators.
-        self._declared: LineFrames | None = None
-        self._waiting: list[ArrivedLine] = []
+        self.sensors: list[SensorLines] = []
+        self.sensors.append(self._sensor("", stated.called))
+        #: Returns the sensor that a line names, "" if none.
+        self._sensor_of: Callable[[str], str] = lambda _: ""
         #: Bytes in no line, and of unfinished lines, since they were passed on.
         self._left_out = [0, 0]
         #: A first line that may lack its beginning, and whether that is a loss.
         self._cut: tuple[ArrivedLine, bool] | None = None
-        self._has_ended = False
-        #: Why reading fails, and why it is not clear what the lines are.
-        self._trouble: str | None = None
-        self._unclear: str | None = None
         self._sink: Callable[..., object] | None = None
         self._thread: threading.Thread | None = None
         self._ends = threading.Event()
@@ -97,20 +78,34 @@ class Lines:
         self.failed: Error | OSError | None = None
         self._given = threading.Lock()
 
-    def _take(self, part: PartOfInput) -> None:
-        """Read the lines of one sensor alone, by whose name it is called."""
-        self._input, self.name = part, source_of(" ".join(filter(None, (self.stated.name, part.name))))
+    def _sensor(self, key: str, name: str) -> SensorLines:
+        waited = self._input is not None and self._input.is_file
+        # The first has the sensor of the readout.
+        readout = None if self.sensors else self._readout
+        shape = LineShape(self.stated, self.place, name, is_row=self._is_row, waited=waited, readout=readout)
+        return SensorLines(key, name, shape)
 
     def _split(self) -> None:
-        """Let lines that name their sensor in turn be of several sources, of which this is the first."""
-        texts = [line.text for line in texts_of(self._waiting)]
-        if not isinstance(self._input, LineInput) or not (found := self.shape.sensors_of(texts)):
-            return
-        names, sensor_of = found
-        first, *others = parts_of_input(self._input, names, sensor_of, self._waiting)
-        self._take(first)
-        self.others = [Lines(self.stated, is_read_out=True, part=part) for part in others]
-        self._waiting = first.read()
+        """Let lines that name their sensor in turn be of several sensors."""
+        [first, *others] = self.sensors
+        found = None if others else first.shape.sensors_of([line.text for line in texts_of(first.waiting)])
+        if found is not None:
+            keys, self._sensor_of = found
+            self.sensors = []
+            for key in keys:
+                named = source_of(" ".join(filter(None, (self.stated.name, key))))
+                self.sensors.append(self._sensor(key, named))
+                self.sensors[-1].declare()
+            self._give(first.waiting)
+
+    def _give(self, lines: Sequence[ArrivedLine]) -> None:
+        """Give each sensor its lines, and all of them empty ones; other lines that name none are the first one's."""
+        for line in lines:
+            key = self._sensor_of(line.text)
+            named = [sensor for sensor in self.sensors if sensor.key == key] if key else self.sensors[:1]
+            self._left_out[0] += line.size * (not named)
+            for sensor in named if line.text.strip() else self.sensors:
+                sensor.waiting.append(line)
 
     def find(self, most_s: float) -> None:
         """Find out how the lines are read. What is stated whole need not have sent anything.
@@ -124,12 +119,10 @@ class Lines:
         ------
         ProblemError : nothing came, or lines that are not what is stated, or that can be read in two ways
         """
+        self.sensors[0].declare(by_program=self._input is None)
         if self._input is None:
-            self._frames = self.shape.of_program()
             return
-        is_stated = self.shape.is_stated
-        if is_stated:
-            self._declared = self.shape.of_statement()
+        is_stated = self.sensors[0].shape.is_stated
         begun, first = time.monotonic(), None
         while True:
             beyond = self._left_out[0]
@@ -137,38 +130,32 @@ class Lines:
             now = time.monotonic()
             # What cannot be a line of numbers is waited out.
             begun = now if self._left_out[0] > beyond else begun
-            first = now if first is None and texts_of(self._waiting) else first
-            since = 0.0 if first is None else now - first
-            enough = len(numbers_of(self._waiting)) >= _LINES or since >= _MEASURE_S or self._has_ended
+            waiting = [line for sensor in self.sensors for line in sensor.waiting]
+            first = now if first is None and texts_of(waiting) else first
+            since, numbers = 0.0 if first is None else now - first, numbers_of(waiting)
+            has_ended = self._input.has_ended
+            enough = len(numbers) >= _LINES or since >= _MEASURE_S or has_ended
             if enough:
                 self._split()
-            if first is not None and (enough or is_stated) and self._understood(final=False):
+            if first is not None and (enough or is_stated) and self._are_understood(final=False):
                 return
-            if is_stated and (first is None or not numbers_of(self._waiting)):
+            if is_stated and not numbers:
                 # The first lines that come will show it.
                 return
-            if first is None and (self._has_ended or now - begun >= most_s):
-                within = "before the end" if self._has_ended else f"within {now - begun:.0f} s"
+            if first is None and (has_ended or now - begun >= most_s):
+                within = "before the end" if has_ended else f"within {now - begun:.0f} s"
                 self._input.discard()
                 self._leave_out()
-                size = sum(self._left_out) + sum(line.size for line in self._waiting)
+                size = sum(self._left_out) + sum(line.size for line in waiting)
                 came = f"{counted(size, 'byte')} arrived {within}, but no line of text that ends"
                 raise ProblemError(f"{self.place}: {came if size else f'no line arrived {within}'}")
-            if first is not None and (since >= _WITHIN_S or self._has_ended):
-                self._understood(final=True)
+            if first is not None and (since >= _WITHIN_S or has_ended):
+                self._are_understood(final=True)
                 return
 
-    def _understood(self, *, final: bool) -> bool:
-        """Return whether the lines so far show what they are; if they are the last to show it, refuse others."""
-        frames = self.shape.of_lines(self._waiting, final=final, has_ended=self._has_ended)
-        if frames is not None and self._declared is not None:
-            frames.unread = self._declared.unread
-        self._frames = frames
-        return frames is not None
-
-    def source(self, readout_unit: str | None) -> dict[str, Any]:
-        """Return the source as the compiled part knows it."""
-        return {"name": self.name, "place": self.place, "kind": {"frames": self.shape.layout(readout_unit)}}
+    def _are_understood(self, *, final: bool) -> bool:
+        has_ended = self._input is not None and self._input.has_ended
+        return all(each.is_understood(final=final, has_ended=has_ended) for each in self.sensors)
 
     def begin(self, sink: Callable[..., object], end: Callable[[str], object]) -> None:
         """Pass lines on in a separate thread, as `_core.Live.lines` takes them, until they end."""
@@ -181,7 +168,7 @@ class Lines:
             try:
                 while not self._ends.is_set():
                     self._pass()
-                    if self._has_ended:
+                    if input_.has_ended:
                         break
                     self._read()
                 if not self._goes_on:
@@ -189,7 +176,8 @@ class Lines:
                     self._leave_out()
                 self._pass()
                 # What follows is no silence.
-                end(self.name)
+                for sensor in self.sensors:
+                    end(sensor.name)
             except (Error, OSError) as error:
                 self.failed = None if self._ends.is_set() else error
 
@@ -203,16 +191,17 @@ class Lines:
         ------
         ProblemError : another number of them, or lines that taxel reads itself
         """
+        [sensor, *_] = self.sensors
         if self._input is not None:
             raise ProblemError(
-                f"source {self.name!r}: taxel reads its lines itself, so a program cannot give it values"
+                f"source {sensor.name!r}: taxel reads its lines itself, so a program cannot give it values"
             )
-        assert self._frames is not None
+        assert sensor.frames is not None
         with self._given:
             try:
-                self._frames.push_values(values, at_ns)
+                sensor.frames.push_values(values, at_ns)
             except ProblemError as error:
-                raise ProblemError(f"source {self.name}: {error}") from None
+                raise ProblemError(f"source {sensor.name}: {error}") from None
             self._pass()
 
     def pause(self) -> None:
@@ -223,7 +212,9 @@ class Lines:
     def renew(self) -> None:
         """Count from now on what is in no frame."""
         self._goes_on, self.failed = False, None
-        self.unread.clear()
+        for sensor in self.sensors:
+            if sensor.frames is not None:
+                sensor.frames.unread.clear()
 
     def close(self) -> None:
         """End reading; what was read is passed on, and the place is closed at once."""
@@ -237,12 +228,6 @@ class Lines:
         if self._thread is not None:
             self._thread.join()
 
-    @property
-    def unread(self) -> dict[str, dict[str, Any]]:
-        """The lines that are in no frame, by kind, with the beginning of the first."""
-        frames = self._frames or self._declared
-        return {} if frames is None else frames.unread
-
     def _read(self) -> None:
         """Take the lines that arrive within a short time."""
         assert self._input is not None
@@ -250,19 +235,17 @@ class Lines:
         try:
             lines = self._input.read()
         except OSError as error:
-            self._trouble = str(error) if error.strerror is None else f"{error.filename}: {error.strerror}"
-            if self._frames is not None:
-                self._frames.restart()
+            for sensor in self.sensors:
+                sensor.interrupt(str(error) if error.strerror is None else f"{error.filename}: {error.strerror}")
         self._leave_out()
-        self._has_ended |= self._input.has_ended
         is_lost = self._input.take_cut() if lines else None
         if is_lost is not None:
             # Of a serial line whose form is not known, the rest of a number is a number too.
-            if self._input.is_serial and self._frames is None and self._declared is None:
+            if self._input.is_serial and not any(sensor.frames for sensor in self.sensors):
                 del lines[0]
-            else:
+            elif self._input.is_serial or _ends_in_number(lines[0].text):
                 self._cut = (lines[0], is_lost)
-        self._waiting += lines
+        self._give(lines)
 
     def _leave_out(self) -> None:
         """Count the bytes that are in no line."""
@@ -270,55 +253,39 @@ class Lines:
         in_no_line, unfinished = self._input.take_left_out()
         self._left_out = [self._left_out[0] + in_no_line, self._left_out[1] + unfinished]
 
-    def _leave_out_cut(self, frames: LineFrames) -> None:
+    def _leave_out_cut(self, sensor: SensorLines, frames: LineFrames) -> None:
         """Leave out a first line that is the rest of one: it does not fit, and ends in a number as lines do."""
-        if self._cut is None:
+        if self._cut is None or self._cut[0] not in sensor.waiting:
             return
         (line, is_lost), self._cut = self._cut, None
-        assert self._input is not None
-        is_rest = self._input.is_serial or _ends_in_number(line.text)
-        if is_rest and line in self._waiting and not frames.fits(line.text):
-            self._waiting.remove(line)
+        if not frames.fits(line.text):
+            sensor.waiting.remove(line)
             # Where reading began amid a line, nothing was lost.
             self._left_out[1] += line.size * is_lost
 
     def _pass(self) -> None:
         """Pass on what the lines so far give; while they do not show what they are, they wait."""
         assert self._sink is not None
-        if self._frames is None and self._waiting:
-            try:
-                self._understood(final=False)
-                self._unclear = None
-            except ProblemError as error:
-                self._unclear = str(error)
-        frames = self._frames
-        if frames is None and (self._ends.is_set() or self._has_ended or not numbers_of(self._waiting)):
-            frames = self._declared
-        if frames is None:
-            del self._waiting[:-_KEPT]
-            return
-        self._leave_out_cut(frames)
-        waiting, self._waiting = self._waiting, []
-        for line in waiting:
-            frames.push(line)
-        if self._has_ended:
-            frames.end()
-        passed = frames.take_passed()
-        in_no_line, unfinished = self._left_out
-        self._left_out = [0, 0]
-        trouble, self._trouble = self._trouble or self._unclear, None
-        arrived_ns, stamps, values = passed.arrays(self.stated.turned)
-        self._sink(
-            self.name,
-            arrived_ns,
-            stamps,
-            values,
-            passed.lines,
-            (passed.strange, in_no_line, unfinished + passed.unfinished),
-            passed.unread,
-            trouble,
-            now_ns(),
-        )
+        has_ended = self._input is not None and self._input.has_ended
+        for sensor in self.sensors:
+            frames = sensor.ready(is_over=self._ends.is_set() or has_ended, has_ended=has_ended)
+            if frames is None:
+                continue
+            self._leave_out_cut(sensor, frames)
+            passed = sensor.pushed(frames, has_ended=has_ended)
+            (in_no_line, unfinished), self._left_out = self._left_out, [0, 0]
+            arrived_ns, stamps, values = passed.arrays(self.stated.turned)
+            self._sink(
+                sensor.name,
+                arrived_ns,
+                stamps,
+                values,
+                passed.lines,
+                (passed.strange, in_no_line, unfinished + passed.unfinished),
+                passed.unread,
+                passed.trouble,
+                now_ns(),
+            )
 
 
 def _ends_in_number(text: str) -> bool:
@@ -342,13 +309,14 @@ def first_lines(source: str, most_s: float) -> list[str]:
     ProblemError : none of numbers arrives
     """
     lines = Lines(StatedSource.of(source), is_read_out=True)
-    until = time.monotonic() + most_s
+    assert lines._input is not None
+    waiting, until = lines.sensors[0].waiting, time.monotonic() + most_s
     try:
-        while time.monotonic() < until and not lines._has_ended and len(numbers_of(lines._waiting)) < _KEPT:
+        while time.monotonic() < until and not lines._input.has_ended and len(numbers_of(waiting)) < _LOOKED_AT:
             lines._read()
     finally:
         lines.close()
-    if not numbers_of(lines._waiting):
-        shown = "".join(f"; it prints {line.text[:60]!r}" for line in lines._waiting[-1:])
+    if not numbers_of(waiting):
+        shown = "".join(f"; it prints {line.text[:60]!r}" for line in waiting[-1:])
         raise ProblemError(f"No numbers arrived: is the sensor connected and switched on?{shown}")
-    return [line.text for line in texts_of(lines._waiting)]
+    return [line.text for line in texts_of(waiting)]

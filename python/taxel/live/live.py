@@ -31,9 +31,6 @@ from taxel.tare import Tare
 #: Prefix of the destinations of the lab streaming layer.
 _LSL = "lsl:"
 
-#: The largest column or row of any taxel.
-_MOST_INDEX = 2**16 - 1
-
 #: How long an iteration waits at a time, s.
 _WAIT_S = 0.5
 
@@ -86,13 +83,15 @@ class Live(contextlib.AbstractContextManager["Live"]):
         preset=NAME). Lines of numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-"
         is the standard input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a
         program passes to `sample`. They are read as tables are (commas, brackets, ``NAME:``, JSON, hex). Those of the
-        first source, and with ``array=``, are frames: a line each, or ``frame_lines=16``, or up to an empty line
-        (``frame_end=blank``); without ``array=`` the shape is that of the readout, if it fits, or guessed (`read_as`).
-        ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B`` adds seconds and
-        nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns, ``leave_out=A:B`` are those
-        without values, ``unit=``, ``falls=`` (true, or the number that readings are subtracted from) and ``rate=``
-        (frames a second; default: measured). Lines without an array of further sources, as of an IMU, are
-        recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
+        first source, and with ``array=``, are frames: a line each, or ``frame_lines=16``, or up to an empty
+        line (``frame_end=blank``), or from a line of text on (``frame_begin=Frame``, and ``frame_time=ms``
+        where it states the time); without ``array=`` the shape is that of the readout, if it fits, or guessed
+        (`read_as`). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B``
+        adds seconds and nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns,
+        ``leave_out=A:B`` are those without values, ``unit=``, ``falls=`` (true, or the number that readings are
+        subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array of further
+        sources, as of an IMU, are recorded with the first source. "lsl:NAME" is a stream of the lab streaming
+        layer.
     first_line_s : float, 0 or more
         How long each source of lines may be silent before its first line, s. A source of which the array, the columns
         and the rate are stated may be silent longer: it starts without a line.
@@ -170,9 +169,7 @@ class Live(contextlib.AbstractContextManager["Live"]):
         #: The unit of the values.
         self.unit: str = "ticks" if layout is None else layout[0]
         #: The length of frames of numbers, us; None of a board.
-        self.frame_us: float | None = None if layout is None else layout[2]
-        #: Whether the source states that unit, as a board does; else it is the readout's.
-        self._states_unit = layout is None or layout[1]
+        self.frame_us: float | None = None if layout is None else layout[1]
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
         #: How the lines that are read out were understood, if what they are was not stated; else "".
@@ -393,19 +390,10 @@ class Live(contextlib.AbstractContextManager["Live"]):
             that is being taken
         OSError : the disk is full
         """
-        columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
+        columns, rows = (numbers(name, value, np.uint16).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
-            raise refused(
-                "x",
-                f" has {counted(len(columns), 'column')}, but y has {counted(len(rows), 'row')}: must be as many rows "
-                "as columns",
-            )
-        for name, indices in (("x", columns), ("y", rows)):
-            if len(indices) and (indices.min() < 0 or indices.max() > _MOST_INDEX):
-                wrong = indices.min() if indices.min() < 0 else indices.max()
-                raise ProblemError(
-                    f"{name}: contains {wrong}; must be the {'column' if name == 'x' else 'row'} of a taxel"
-                )
+            counts = f"{counted(len(columns), 'column')}, but y has {counted(len(rows), 'row')}"
+            raise refused("x", f" has {counts}: must be as many rows as columns")
         return tuple(
             Zeroing(**zeroing) for zeroing in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True)))
         )

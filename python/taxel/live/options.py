@@ -26,94 +26,85 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """The options of a `Live`, which documents each, with their defaults."""
+    """The options of a `Live`, which explains each: what the command line says of them, and their defaults.
 
-    port: int | None = option(
-        None,
-        "The UDP port that the board sends to. Default: 5208, unless --source names what to receive.",
-        least=0,
-        most=65_535,
-        commands="live record",
-    )
+    Parameters
+    ----------
+    port : int | None
+        The UDP port that the board sends to. Default: 5208, unless --source names what to receive.
+    host : str | None
+        The address of this machine to listen on for a board; 0.0.0.0: all.
+    array : Array | None
+        Rows, columns and pitch of the sensor. Default: those of the readout, else 64x64x2.67. For example
+        24x20x5. Default pitch: 2.67 mm.
+    registers : str | Registers | None
+        The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a board of this array
+        at reset.
+    differences : bool
+        The board sends intensity differences.
+    readout : Readout | PlainRule | None
+        A trained readout or a plain rule; without one nothing is detected. taxel train writes such files
+        (JSON).
+    use : str
+        What detects each label: better (the better one in training), rule (its plain rule) or neuron. A label
+        with no rule is not detected by rule.
+    tare : Tare | float | None
+        Rest of the taxels: a saved tare, or the seconds at rest at the beginning, from which a fresh tare is
+        taken. A recording of the sensor at rest (taxel cut) can be used instead of a saved tare.
+    absorb_s : float | None
+        After how many seconds a load that stays becomes rest, in frames of numbers, whose rest follows drift;
+        0: the rest stays as it was measured. Default: as in the training.
+    record : str | os.PathLike[str] | None
+        Record in a new .mcap file.
+    record_later : bool
+        Let `record` and `end_recording` begin and end recordings while the `Live` runs.
+    name : str
+        The board's name among the sources of the recording.
+    sources : Mapping[str, str] | str | Sequence[str] | None
+        The source to receive: [NAME=]KIND:PLACE and, after commas, KEY=VALUE; for example lines:-,array=16x16
+        or serial:COM3,array=16x16. It sends frames of numbers, is a board (board:HOST:PORT), or is a further
+        source of a recording. May be repeated.
+    first_line_s : float
+        How long each source of lines may be silent before its first line, s.
+    compression : str
+        Compression of a .mcap: none, lz4 or zstd.
+    overwrite : bool
+        Replace output files that exist already.
+    guard_frames : float | None
+        How far, in frames, a readout stays behind the host's clock while no events arrive. Default: 3; 5 of a
+        source of numbers.
+    lines : bool
+        Print one line of JSON for each detection, and nothing else.
+    send : str | Sequence[str]
+        Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or
+        lines+udp:HOST:PORT. May be repeated.
+    say : Callable[[Detection], object] | None
+        Called with each detection.
+    """
+
+    port: int | None = option(None, least=0, most=65_535, commands="live record")
     _: KW_ONLY
-    host: str | None = option(
-        None, "The address of this machine to listen on for a board; 0.0.0.0: all.", commands="live record"
-    )
-    array: Array | None = option(
-        None,
-        "Rows, columns and pitch of the sensor. Default: those of the readout, else 64x64x2.67.",
-        commands="live record",
-        metavar="ROWSxCOLUMNS[xMM]",
-        typed="For example 24x20x5. Default pitch: 2.67 mm.",
-    )
-    registers: str | Registers | None = option(
-        None,
-        "The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a board of this array at "
-        "reset.",
-        commands="live record",
-        flag="--preset",
-    )
-    differences: bool = option(False, "The board sends intensity differences.", commands="live record")
-    readout: Readout | PlainRule | None = option(
-        None,
-        "A trained readout or a plain rule; without one nothing is detected.",
-        metavar="FILE",
-        typed="taxel train writes such files (JSON).",
-    )
-    use: str = option(
-        "better",
-        "What detects each label: better (the better one in training), rule (its plain rule) or neuron. A label with "
-        "no rule is not detected by rule.",
-        metavar="better|rule|neuron",
-    )
-    tare: Tare | float | None = option(
-        None,
-        "Rest of the taxels: a saved tare, or the seconds at rest at the beginning, from which a fresh tare is taken.",
-        metavar="FILE|SECONDS",
-        typed="A recording of the sensor at rest (taxel cut) can be used instead of a saved tare.",
-    )
-    absorb_s: float | None = option(
-        None,
-        "After how many seconds a load that stays becomes rest, in frames of numbers, whose rest follows drift; 0: the "
-        "rest stays as it was measured. Default: as in the training.",
-        least=0,
-        most=1800,
-    )
-    record: str | os.PathLike[str] | None = option(None, "Record in a new .mcap file.")
-    record_later: bool = option(
-        False, "Let `record` and `end_recording` begin and end recordings while the `Live` runs.", commands=""
-    )
-    name: str = option("board", "The board's name among the sources of the recording.", commands="record")
+    host: str | None = option(None, commands="live record")
+    array: Array | None = option(None, commands="live record", metavar="ROWSxCOLUMNS[xMM]")
+    registers: str | Registers | None = option(None, commands="live record", flag="--preset")
+    differences: bool = option(False, commands="live record")
+    readout: Readout | PlainRule | None = option(None, metavar="FILE")
+    use: str = option("better", metavar="better|rule|neuron")
+    tare: Tare | float | None = option(None, metavar="FILE|SECONDS")
+    absorb_s: float | None = option(None, least=0, most=1800)
+    record: str | os.PathLike[str] | None = option(None)
+    record_later: bool = option(False, commands="")
+    name: str = option("board", commands="record")
     sources: Mapping[str, str] | str | Sequence[str] | None = option(
-        None,
-        "The source to receive: [NAME=]KIND:PLACE and, after commas, KEY=VALUE; for example lines:-,array=16x16 or "
-        "serial:COM3,array=16x16. It sends frames of numbers, is a board (board:HOST:PORT), or is a further source of "
-        "a recording.",
-        commands="live record",
-        flag="--source",
-        metavar="[NAME=]KIND:PLACE",
-        typed="May be repeated.",
+        None, commands="live record", flag="--source", metavar="[NAME=]KIND:PLACE"
     )
-    first_line_s: float = option(
-        3.0, "How long each source of lines may be silent before its first line, s.", least=0, commands=""
-    )
-    compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
-    overwrite: bool = option(False, "Replace output files that exist already.", commands="live record")
-    guard_frames: float | None = option(
-        None,
-        "How far, in frames, a readout stays behind the host's clock while no events arrive. Default: 3; 5 of a source "
-        "of numbers.",
-        least=0,
-    )
-    lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
-    send: str | Sequence[str] = option(
-        (),
-        "Send each detection as a line of JSON to serial:PLACE, lines:PATH (a named pipe), lines+tcp:HOST:PORT or "
-        "lines+udp:HOST:PORT.",
-        metavar="WHERE",
-        typed="May be repeated.",
-    )
-    say: Callable[[Detection], object] | None = option(None, "Called with each detection.", commands="")
+    first_line_s: float = option(3.0, least=0, commands="")
+    compression: str = option("none", commands="record")
+    overwrite: bool = option(False, commands="live record")
+    guard_frames: float | None = option(None, least=0)
+    lines: bool = option(False, flag="--json")
+    send: str | Sequence[str] = option((), metavar="WHERE")
+    say: Callable[[Detection], object] | None = option(None, commands="")
 
     def completed(self) -> LiveOptions:
         """Return the options with the sensor of the readout; refuse options that make no sense."""

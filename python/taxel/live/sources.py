@@ -15,6 +15,7 @@ from taxel.array import Array
 from taxel.live.lines import Lines
 from taxel.live.lsl import LslInlet
 from taxel.live.options import LiveOptions
+from taxel.live.sensor_lines import SensorLines
 from taxel.live.stated_source import StatedSource
 
 __all__ = ["Sources"]
@@ -65,7 +66,7 @@ class Sources:
                 boards = [k for k, source in enumerate(stated) if source.kind == "board"]
                 options = self._read_out(stated.pop(boards[0] if boards else 0), options)
             self.options = options
-            self._others = [] if self._read is None else [each.source(self._unit) for each in self._read.others]
+            self._others = [] if self._read is None else self._of_rust(self._read, self._read.sensors[1:])
             self._others += [each for source in stated for each in self._other(source)]
 
     @contextlib.contextmanager
@@ -93,7 +94,8 @@ class Sources:
                 f"source {source.text!r}: contains no frames, so it cannot be shown or read by a readout"
             )
         self._read = self._opened(source, options, is_read_out=True)
-        return replace(options, array=self._read.shape.array, name=self._read.name)
+        first = self._read.sensors[0]
+        return replace(options, array=first.shape.array, name=first.name)
 
     def _other(self, source: StatedSource) -> list[dict[str, Any]]:
         """Return a further source as the compiled part knows it, or several that print to one place."""
@@ -106,22 +108,25 @@ class Sources:
             inlet = self._inlets[source.called] = LslInlet(source.place)
             source = StatedSource.of(f"{source.called}=given,columns={':'.join(inlet.columns)}")
         lines = self._opened(source, self.options, is_read_out=False)
-        return [each.source(self._unit) for each in (lines, *lines.others)]
+        return self._of_rust(lines, lines.sensors)
+
+    def _of_rust(self, lines: Lines, sensors: Sequence[SensorLines]) -> list[dict[str, Any]]:
+        return [
+            {"name": each.name, "place": lines.place, "kind": {"frames": each.shape.layout(self._unit)}}
+            for each in sensors
+        ]
 
     def _opened(self, source: StatedSource, options: LiveOptions, *, is_read_out: bool) -> Lines:
-        if (kept := self._kept.get(source.text)) is not None:
-            for each in (kept, *kept.others):
-                each.renew()
-                self.lines.append(each)
-            return kept
+        if (lines := self._kept.get(source.text)) is not None:
+            lines.renew()
+            self.lines.append(lines)
+            return lines
         lines = Lines(source, is_read_out=is_read_out, readout=self._readout)
         self.lines.append(lines)
         lines.find(options.first_line_s)
-        for other in lines.others:
-            self.lines.append(other)
-            other.find(options.first_line_s)
-        if len({each.name for each in self.lines}) < len(self.lines):
-            raise ProblemError(f"source {source.text!r}: another has lines of {lines.name} too; begin it with NAME=")
+        names = [sensor.name for each in self.lines for sensor in each.sensors]
+        if len({*names}) < len(names):
+            raise ProblemError(f"source {source.text!r}: another has lines of {names[-1]} too; begin it with NAME=")
         return lines
 
     def for_rust(self, send: Sequence[str]) -> str:
@@ -129,13 +134,14 @@ class Sources:
         read = self._read
         frames = None
         if read is not None:
-            frames = {"text": read.stated.text, "place": read.place, "layout": read.shape.layout(self._unit)}
+            layout = read.sensors[0].shape.layout(self._unit)
+            frames = {"text": read.stated.text, "place": read.place, "layout": layout}
         return self.options.for_rust(send=list(send), read=frames, sources=self._others)
 
     @property
     def read_as(self) -> str:
         """How the lines that are read out were understood, if what they are was not stated; else ""."""
-        return "" if self._read is None else self._read.shape.read_as
+        return "" if self._read is None else self._read.sensors[0].shape.read_as
 
     def begin(self, core: _core.Live) -> None:
         """Pass what arrives on."""
@@ -152,17 +158,17 @@ class Sources:
         ProblemError : no such source, or another number of columns
         OSError : the disk is full
         """
-        lines = next((lines for lines in self.lines if lines.name == name), None)
+        lines = next((lines for lines in self.lines if name in [each.name for each in lines.sensors]), None)
         if lines is None:
             raise ProblemError(f"source {name!r}: no source of numbers has this name")
         lines.sample(values, _core.now_ns() if at_ns is None else at_ns)
 
     def with_unread(self, counters: dict[str, Any]) -> dict[str, Any]:
         """Return counters with the lines of each source of frames that are in no frame, by kind."""
-        for lines in self.lines:
-            of = counters if lines is self._read else counters["sources"].get(lines.name, {})
-            if of.get("lines") is not None:
-                of["lines"]["unread"] = {kind: dict(found) for kind, found in lines.unread.items()}
+        for sensor in (sensor for lines in self.lines for sensor in lines.sensors):
+            of = counters if sensor.name == self.options.name else counters["sources"].get(sensor.name, {})
+            if of.get("lines") is not None and sensor.frames is not None:
+                of["lines"]["unread"] = {kind: dict(found) for kind, found in sensor.frames.unread.items()}
         return counters
 
     def pause(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from taxel import _core
@@ -24,7 +24,7 @@ _FORMS = (
 )
 _LINES = ("serial", "lines", "lines+tcp", "lines+udp")
 _OF_BOARD = ("array", "preset")
-_OF_LINES = ("array", "baud", "time", "columns", "leave_out", "by", "frame_lines", "frame_end", "unit", "falls", "rate")
+_OF_LINES = ("array", *(each.name for each in fields(PrintedFrames)[1:]), "unit", "falls", "rate")
 
 
 @dataclass(frozen=True)
@@ -131,12 +131,10 @@ class StatedSource:
         printed = PrintedFrames(
             place,
             baud=_whole("baud", keys.get("baud")),
-            time=keys.get("time"),
             columns=columns,
             leave_out=keys["leave_out"].split(":") if "leave_out" in keys else (),
-            by=keys.get("by"),
             frame_lines=_whole("frame_lines", keys.get("frame_lines")),
-            frame_end=keys.get("frame_end"),
+            **{key: keys.get(key) for key in ("time", "by", "frame_end", "frame_begin", "frame_time")},
         )
         unit, preset = keys.get("unit"), keys.get("preset", cls.preset)
         return cls(text, kind, name, place, array, printed, unit, turned, rate, preset)
@@ -144,7 +142,8 @@ class StatedSource:
     @property
     def are_frames(self) -> bool:
         """Whether its lines are stated to be frames of an array."""
-        return self.array is not None or self.printed.frame_lines is not None or self.printed.frame_end is not None
+        printed = self.printed
+        return self.array is not None or any((printed.frame_lines, printed.frame_end, printed.frame_begin))
 
     @property
     def called(self) -> str:
@@ -159,17 +158,8 @@ class StatedSource:
 
 
 def with_layout(source: str, form: Form, layout: Layout) -> str:
-    """Return a source with what a layout states of its lines, which a form reads.
-
-    Raises
-    ------
-    ProblemError : frames begin at a line of text
-    """
+    """Return a source with what a layout states of its lines, which a form reads."""
     table, columns = form.table, form.columns
-    if table.frame_begin is not None:
-        raise ProblemError(
-            "frames that begin at a line of text are read of files alone: print an empty line after each"
-        )
     array = layout.grid() or (array_of(form, None, None, "")[0] if form.lines > 1 else None)
     times = "+".join(str(k + 1) for k in columns.times)
     left = (k for k in range(len(form.names)) if k not in {*columns.times, *columns.taxels, columns.by})
@@ -179,6 +169,8 @@ def with_layout(source: str, form: Form, layout: Layout) -> str:
         "by": None if columns.by is None else columns.by + 1,
         "frame_lines": table.frame_lines,
         "frame_end": table.frame_end,
+        "frame_begin": table.frame_begin,
+        "frame_time": table.frame_time,
         "array": None if array is None else f"{array.rows}x{array.columns}",
         "unit": layout.unit,
         "falls": "true" if layout.falls is True else layout.turned,

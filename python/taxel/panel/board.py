@@ -41,8 +41,8 @@ class Board:
         self._lock = threading.Lock()
         #: In the registers' own units.
         self.registers: dict[str, Any] = Registers()._held
-        #: Whether they were read from the board.
-        self.known = False
+        #: Whether they were read from the board, and whether it has answered since it was connected.
+        self.known = self._has_answered = False
         #: When the line was lost, s of the monotonic clock.
         self._lost_s: float | None = None
 
@@ -58,7 +58,8 @@ class Board:
 
     def connect(self, cable: Cable) -> None:
         """Use a serial line from now on."""
-        self._cable, self._resets, self.known, self._lost_s = cable, 0, False, None
+        self._cable, self._resets, self._lost_s = cable, 0, None
+        self.known = self._has_answered = False
 
     def close(self) -> None:
         """Close the serial line."""
@@ -69,9 +70,9 @@ class Board:
 
     @property
     def is_due(self) -> bool:
-        """Whether registers are read again: they were known, or the line was lost a while ago."""
+        """Whether registers are read again: the board has answered once, or the line was lost a while ago."""
         lost_s = self._lost_s
-        return self.is_connected and (self.known if lost_s is None else time.monotonic() - lost_s > _TAKEN_S)
+        return self.is_connected and (self._has_answered if lost_s is None else time.monotonic() - lost_s > _TAKEN_S)
 
     def was_reset(self) -> bool:
         """Return whether the board has reported a reset since the last call."""
@@ -115,7 +116,8 @@ class Board:
                 if isinstance(error, OSError) or self._lost_s is not None:
                     self._lost_s = time.monotonic()
                 raise
-            self.registers, self.known = _core.registers_of_words(words, channels), True
+            self.registers = _core.registers_of_words(words, channels)
+            self.known = self._has_answered = True
 
     def set(self, values: dict[str, Any], array: Array) -> None:
         """Write registers by name; all, or none where a rule is broken."""

@@ -32,12 +32,6 @@ def line(most: int, least: int = 1) -> Meta:
     return Meta(min_length=least, max_length=most, pattern=_TEXT if least else _LINE)
 
 
-def request(method: _Method) -> _Method:
-    """Declare a method to be a request, carried out before the client's next one."""
-    method.is_long = False  # type: ignore[attr-defined]
-    return method
-
-
 def long_request(method: _Method) -> _Method:
     """Declare a method to be a request that takes long: carried out beside others."""
     method.is_long = True  # type: ignore[attr-defined]
@@ -80,10 +74,10 @@ class Request:
 
 
 def requests_of(session: type) -> dict[str, Request]:
-    """Return the requests that a class declares, by name, in the order of its methods."""
+    """Return the requests that a class declares by public methods, by name, in the order of these."""
     found: dict[str, Request] = {}
     for name, method in vars(session).items():
-        if not hasattr(method, "is_long"):
+        if name.startswith("_") or not inspect.iscoroutinefunction(method):
             continue
         kinds = get_type_hints(method, include_extras=True)
         fields = [
@@ -92,5 +86,5 @@ def requests_of(session: type) -> dict[str, Request]:
             if key in kinds
         ]
         keys = msgspec.defstruct(name, fields, forbid_unknown_fields=True, kw_only=True)
-        found[name.rstrip("_")] = Request(method, method.is_long, keys)
+        found[name.rstrip("_")] = Request(method, hasattr(method, "is_long"), keys)
     return found

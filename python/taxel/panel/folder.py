@@ -88,14 +88,12 @@ class Folder:
     path : Path
     opening : Opening
         How recordings are opened.
-    asked : str or None
-        The recording that is opened so also if it is a board's.
     records : function
         Whether a recording runs.
     """
 
-    def __init__(self, path: Path, opening: Opening, asked: str | None, records: Callable[[], bool]) -> None:
-        self.path, self._asked = path, asked
+    def __init__(self, path: Path, opening: Opening, records: Callable[[], bool]) -> None:
+        self.path = path
         self.files, self.looks = ShownFiles(opening, records), Looks()
         self._opening = opening
         self._locks: dict[Path, asyncio.Lock] = {}
@@ -192,30 +190,18 @@ class Folder:
         """
         path = self.file(name)
         async with self._locks.setdefault(path, asyncio.Lock()):
-            if (known := self._known(path, trial)) is not None:
+            known = self._open.get((path, trial))
+            if known is not None and known.state == state_of(path):
                 return known
             shown = await in_thread(self._index, name, path, trial)
             self._open = dict([*self._open.items()][-3:]) | {(path, trial): shown}
             return shown
 
-    def _known(self, path: Path, trial: str | None) -> Shown | None:
-        """Return a recording that was opened and is as it was."""
-        known = self._open.get((path, trial))
-        return None if known is None or known.state != state_of(path) else known
-
     def _index(self, name: str, path: Path, trial: str | None) -> Shown:
         state = state_of(path)
-        viewed = self.files.read(path, trial, by_options=path.name == self._asked)
-        frames = viewed.contents["frames"] or {}
-        return Shown(
-            name,
-            path,
-            trial,
-            frames.get("trial") or "",
-            viewed.recording,
-            viewed.contents,
-            state,
-        )
+        recording, contents = self.files.read(path, trial)
+        of_frames = contents["frames"] or {}
+        return Shown(name, path, trial, of_frames.get("trial") or "", recording, contents, state)
 
 
 def _begins_as_readout(file: Path) -> bool:

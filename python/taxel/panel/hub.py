@@ -9,11 +9,13 @@ import threading
 from collections.abc import Callable, Coroutine, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from msgspec.json import encode
 
 from taxel import _core
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import PlainRule, Readout, load
 from taxel.detect.board import differences
@@ -21,9 +23,9 @@ from taxel.device import Cable
 from taxel.frames import Frames
 from taxel.live import Live
 from taxel.panel.board import Board
-from taxel.panel.folder import Folder, Shown
+from taxel.panel.client import Client
+from taxel.panel.folder import Folder
 from taxel.panel.labels import LabelTables
-from taxel.panel.messages import text_of
 from taxel.panel.recorder import Recorder
 from taxel.panel.shown_files import Opening
 from taxel.panel.threads import in_thread
@@ -37,74 +39,33 @@ _T = TypeVar("_T")
 _COUNT_S, _FOLLOW_S, _READ_S = 0.25, 0.3, 2.0
 
 
-class Client(Protocol):
-    """Serve a client: a session."""
-
-    view: _core.PanelView
-    shown: Shown | None
-    credits: int
-    answers: bool
-
-    async def say(self, message: dict[str, Any] | str) -> None:
-        """Send a message."""
-
-    async def send_frame(self) -> None:
-        """Send a frame, if there is a new one."""
-
-    def waiting(self) -> int:
-        """Return how many bytes wait for the client."""
-
-    def unread_s(self, waiting: int, now: float) -> float:
-        """Return for how long the client has read nothing of what waits for it, s."""
-
-    def abort(self) -> None:
-        """Disconnect the client at once."""
-
-
 class Hub:
     """Hold what all clients share. All methods but `live` and `close` are called in the server's thread.
 
     Parameters
     ----------
     live : Live or None
-    registers_stated : bool
-        Whether somebody stated the board's registers.
     folder : Path
         That of the recordings.
-    opened : str or None
-        The recording to show first.
     opening : Opening
-        How recordings are opened.
+        How recordings are opened, and which first.
     cable : Cable or None
         The board's serial line, which `close` closes.
-    asked : bool
-        Whether `opened` is opened by `opening` also if it is a board's.
-    tables : str
-        The end of the names of the tables of labels.
     """
 
-    def __init__(
-        self,
-        live: Live | None,
-        registers_stated: bool,
-        folder: Path,
-        opened: str | None,
-        opening: Opening,
-        cable: Cable | None,
-        *,
-        asked: bool,
-        tables: str,
-    ) -> None:
+    def __init__(self, live: Live | None, folder: Path, opening: Opening, cable: Cable | None) -> None:
         self.sessions: list[Client] = []
-        #: Requests that are carried out beside others.
-        self.tasks: set[asyncio.Task[None]] = set()
-        self.opened, self.registers_stated = opened, registers_stated
-        self.recorder: Recorder = Recorder(self)
-        self.folder = Folder(folder, opening, opened if asked else None, lambda: self.recorder.runs)
-        self.labels = LabelTables(self.folder, opening, tables)
+        self._tasks: set[asyncio.Task[None]] = set()
+        self.opened = opening.first
+        #: Whether somebody stated the board's registers.
+        self.registers_stated = live is not None and live._registers_stated
+        self.recorder = Recorder(self.say, self._mark)
+        self.folder = Folder(folder, opening, lambda: self.records)
+        self.labels = LabelTables(self.folder, opening)
         self.training = Training(opening, self.folder.files)
         self.board, self._on_board = Board(cable), asyncio.Lock()
-        self.source: _core.PanelLive | None = None
+        #: The live sources that views have shown, by name; the first is read out.
+        self._sources: dict[str, _core.PanelLive] = {}
         #: In what the board was said to differ from that of the readout's training.
         self._differing = ""
         # Locked while one `Live` replaces another.
@@ -112,6 +73,11 @@ class Hub:
         self._live = self._first = live
         if live is not None:
             self._show_live(live)
+
+    @property
+    def source(self) -> _core.PanelLive | None:
+        """The live source that is read out, as views see it."""
+        return next(iter(self._sources.values()), None)
 
     @property
     def live(self) -> Live | None:
@@ -129,6 +95,11 @@ class Hub:
         """End a training, which no request may wait for."""
         self.training.close()
 
+    def keep(self, task: asyncio.Task[None]) -> None:
+        """Let a task go on when who began it has left."""
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
     def works(self) -> Iterator[Coroutine[Any, Any, None]]:
         """Yield what is done beside the clients until the server ends."""
         yield self._count()
@@ -141,39 +112,42 @@ class Hub:
     def join(self, session: Client) -> None:
         """Count another client."""
         self.sessions.append(session)
-        if self.source is not None:
-            self.source.watch(True)
+        self._watch()
 
     def leave(self, session: Client) -> None:
         """Count one client less."""
         self.sessions.remove(session)
-        if self.source is not None and not self.sessions:
-            self.source.watch(False)
+        self._watch()
 
-    async def say(self, message: dict[str, Any] | str) -> None:
-        """Send a message to all clients."""
-        text = message if isinstance(message, str) else await text_of(message)
+    def _watch(self) -> None:
+        for source in self._sources.values():
+            source.watch(bool(self.sessions))
+
+    async def say(self, message: dict[str, Any] | str, source: _core.PanelLive | None = None) -> None:
+        """Send a message to all clients, or to those that follow a source."""
+        text = message if isinstance(message, str) else encode(message).decode()
         for session in list(self.sessions):
-            await session.say(text)
+            if source is None or session.follows is source:
+                await session.say(text)
 
     async def warn(self, reason: object) -> None:
         """Tell all clients what went wrong."""
         await self.say({"type": "warning", "text": str(reason)})
 
     async def tell(self) -> None:
-        """Send what has happened at the live source."""
-        news = None if self.source is None else self.source.news()
-        if news is None:
-            return
-        detections, was_reset, zeroed, about = news
-        for text in detections:
-            await self.say(text)
-        if was_reset:
-            await self.forget_registers()
-        if zeroed:
-            await self.say(self.zeroed())
-        if about:
-            await self.say(self.hello())
+        """Send what has happened at the live sources."""
+        for source in [*self._sources.values()]:
+            if (news := source.news()) is None:
+                continue
+            detections, was_reset, zeroed, about = news
+            for text in detections:
+                await self.say(text)
+            if was_reset and source is self.source:
+                await self.forget_registers()
+            if zeroed:
+                await self.say(self.zeroed(source), source)
+            if about:
+                await self.say(self.hello(source), source)
 
     # ---------------------------------------------------------------------------------------------- the live source
 
@@ -189,17 +163,24 @@ class Hub:
             raise ProblemError("no board is connected")
         return self.source
 
+    def source_of(self, name: str) -> _core.PanelLive:
+        """Return one of the live sources as views see it; a ProblemError says that there is none of that name."""
+        if name not in self._sources:
+            self._sources[name] = self.needed_source().of_source(name)
+            self._watch()
+        return self._sources[name]
+
     def _show_live(self, live: Live) -> None:
         """Show another live source from now on."""
         # It may be the board whose registers were read: then the other source begins with them.
         source = _core.PanelLive(live._core, json.dumps(self.board.registers) if self.board.known else None)
         if not self.board.known:
             self.board.registers = source.registers()
-        source.watch(bool(self.sessions))
-        self._live, self.source = live, source
+        self._live, self._sources = live, {live.name: source}
+        self._watch()
 
-    async def restart(self, change: Callable[[Live], Live]) -> None:
-        """Show the `Live` that a function makes of the one before.
+    async def restart(self, change: Callable[[Live], dict[str, Any]], *, keeps_places: bool = False) -> None:
+        """Show another `Live` with the options that a function of the one before changes.
 
         Raises
         ------
@@ -212,17 +193,24 @@ class Hub:
         if self._live._options.record is not None:
             raise ProblemError("a recording from this address is running; end it first")
 
-        def replaced() -> None:
+        def replace() -> None:
             with self._restarting:
                 assert self._live is not None
-                self._show_live(change(self._live))
+                before, changed = self._live, change(self._live)
+                # A serial line has one reader at a time.
+                before._pause() if keeps_places else before.stop()
+                try:
+                    self._show_live(before._again(**changed))
+                except Exception:
+                    self._show_live(_in_sight(before))
+                    raise
 
-        await in_thread(replaced)
+        await in_thread(replace)
         for session in self.sessions:
-            session.view.set_live(self.source)
-        await self.say(self.hello())
+            session.follow(self.source)
+        await self.say(self.hello(self.source))
         await self.say(self.registers())
-        await self.say(self.zeroed())
+        await self.say(self.zeroed(self.source))
 
     async def read_source(self, source: str) -> None:
         """Receive another source, as `sources` of `taxel.live.Live` names it, with all other options unchanged.
@@ -230,31 +218,15 @@ class Hub:
         A tare is one board's: a readout that reads with one ends, unless the tare is taken afresh.
         """
 
-        def change(before: Live) -> Live:
+        def change(before: Live) -> dict[str, Any]:
             own = {"readout": None, "tare": None} if isinstance(before._options.tare, Tare) else {}
-            # A serial line has one reader at a time.
-            before.stop()
-            return self._replaced(before, port=None, host=None, sources=source, **own)
+            return {"port": None, "host": None, "sources": source, **own}
 
         await self.restart(change)
 
     async def read_nothing(self) -> None:
         """Receive nothing any more."""
         await self.read_source(_nothing_like(self.needed_live()))
-
-    def _replaced(self, before: Live, **changed: Any) -> Live:
-        """Return the `Live` in place of one that has ended; where it is refused, the sensor stays in sight."""
-        try:
-            return before._again(**changed)
-        except Exception:
-            try:
-                self._show_live(before._again())
-            except (OSError, _core.Error):
-                # It is not there any more.
-                before.stop()
-                nothing = {"sources": _nothing_like(before), "readout": None, "tare": None}
-                self._show_live(before._again(port=None, host=None, **nothing))
-            raise
 
     async def read_out(self, readout: Path, use: str) -> None:
         """Read the live source out with another readout: time, values and the past begin again.
@@ -266,16 +238,15 @@ class Hub:
         await self._agree()
 
     async def _begin_readout(self, loaded: Callable[[], Readout | PlainRule], **changed: Any) -> None:
-        def change(before: Live) -> Live:
+        def change(before: Live) -> dict[str, Any]:
             readout = loaded()
             tare = before.tare or (before._options.tare if before._options.readout is not None else None)
             if tare is None:
                 tare = _rest_of_held(before)
             held = {"registers": Registers._of(self.board.registers, before.array)} if self.board.known else {}
-            before._pause()
-            return self._replaced(before, readout=readout, tare=tare, **held, **changed)
+            return {"readout": readout, "tare": tare, **held, **changed}
 
-        await self.restart(change)
+        await self.restart(change, keeps_places=True)
 
     async def _agree(self) -> None:
         """Say once in what the board differs from the training's; read out above a raised noise floor."""
@@ -294,12 +265,51 @@ class Hub:
         else:
             await self._begin_readout(lambda: readout)
 
+    # ---------------------------------------------------------------------------------------------- recording
+
+    @property
+    def records(self) -> bool:
+        """Whether any recording of the live source runs, also one that the page did not begin."""
+        return self.recorder.is_busy or (self.source is not None and self.source.is_recording())
+
+    async def record(self, name: str, label: str | None, length_s: float | None) -> None:
+        """Begin a recording, which ends by itself after `length_s`, and goes on without clients.
+
+        Raises
+        ------
+        ProblemError : a recording runs; there is no live source; the file exists
+        OSError : it cannot be written
+        """
+        if self.records:
+            raise ProblemError("a recording runs already: stop it first")
+        live, source = self.needed_live(), self.needed_source()
+        path = self.folder.file(f"{name}.mcap")
+        if path.exists():
+            raise refused("name", f": {path.name} exists already; choose another name")
+        await self.recorder.begin(source, path, label, length_s)
+
+        async def run() -> None:
+            await self.recorder.run(live, source)
+            await self.say(await self.recordings())
+            await self.say(self.recorder.message())
+
+        self.keep(asyncio.create_task(run()))
+
+    async def _mark(self, on: bool) -> bool:
+        if self.board.is_connected:
+            try:
+                await self.on_board(lambda: self.board.record(on))
+            except (OSError, _core.Error) as error:
+                await self.warn(f"register record: {error}")
+        return self.board.is_connected
+
     # ---------------------------------------------------------------------------------------------- the board
 
     async def connect(self, cable: Cable) -> None:
         """Use the board's serial line from now on."""
         self.board.connect(cable)
-        await self.say(self.hello())
+        for session in self.sessions:
+            await session.say(self.hello(session.follows))
         await self.prepare()
 
     async def prepare(self) -> None:
@@ -339,12 +349,13 @@ class Hub:
         """Send the counters, and read the board's line, whose greetings report resets."""
         while True:
             await asyncio.sleep(_COUNT_S)
-            if self.source is None or not self.sessions:
+            if not self.sessions:
                 continue
-            certain = self.registers_stated or self.board.known
-            frame_us = _core.registers_words(json.dumps(self.board.registers))[1] if certain else None
-            counters = self.source.counters(frame_us)
-            await self.say(f'{counters[:-1]},"viewers":{len(self.sessions)}}}')
+            for source in [*self._sources.values()]:
+                certain = source is self.source and (self.registers_stated or self.board.known)
+                frame_us = _core.registers_words(json.dumps(self.board.registers))[1] if certain else None
+                counters = source.counters(frame_us)
+                await self.say(f'{counters[:-1]},"viewers":{len(self.sessions)}}}', source)
             if self.board.is_connected and await in_thread(self.board.was_reset):
                 await self.forget_registers()
 
@@ -368,7 +379,7 @@ class Hub:
 
     async def say_labels(self, name: str) -> None:
         """Send the labels of a recording to the clients that show it."""
-        text = await text_of(self.labels.message(name))
+        text = encode(self.labels.message(name)).decode()
         for session in list(self.sessions):
             if (self.recorder.file if session.shown is None else session.shown.name) == name:
                 await session.say(text)
@@ -383,14 +394,17 @@ class Hub:
 
     # ---------------------------------------------------------------------------------------------- messages
 
-    def hello(self) -> dict[str, Any]:
-        """Return what the panel shows, sent again when any of it changes."""
-        nothing = dict.fromkeys(("array", "udp", "lines", "source", "frames", "readout"))
-        live = {**nothing, "sources": []} if self.source is None else self.source.about()
+    def hello(self, source: _core.PanelLive | None) -> dict[str, Any]:
+        """Return what a client that follows a source is shown, sent again when any of it changes."""
+        live: dict[str, Any] = dict.fromkeys(("array", "udp", "lines", "source", "sensor", "frames", "readout"))
+        live["sources"] = []
+        if source is not None:
+            of_all = self.needed_source().about()
+            live = source.about() | {key: of_all[key] for key in ("sources", "readout")}
         return {
             "type": "hello",
             "protocol": 1,
-            "live": self.source is not None,
+            "live": source is not None,
             "control": self.board.place,
             "folder": str(self.folder.path),
             "open": self.opened,
@@ -418,9 +432,9 @@ class Hub:
         fitting = list(fitting_presets(self.board.registers, array))
         return {"type": "presets", "built_in": fitting, "fields": fields_of_registers()}
 
-    def zeroed(self) -> dict[str, Any]:
-        """Return the taxels of the live source that were zeroed, each as it was last; sent when that has changed."""
-        zeroings = () if self._live is None else self._live.zeroed
+    def zeroed(self, source: _core.PanelLive | None) -> dict[str, Any]:
+        """Return the taxels of a live source that were zeroed, each as it was last; sent when that has changed."""
+        zeroings = () if self._live is None or source is not self.source else self._live.zeroed
         return {
             "type": "zeroed",
             "taxels": [{"taxel": (z.x, z.y), "t_us": z.t, "rest": z.rest, "before": z.before} for z in zeroings],
@@ -439,6 +453,16 @@ class Hub:
             ],
             "readouts": readouts,
         }
+
+
+def _in_sight(before: Live) -> Live:
+    """Return a `Live` like one that has ended, so that its sensor stays in sight where another is refused."""
+    try:
+        return before._again()
+    except (OSError, _core.Error):
+        # It is not there any more.
+        before.stop()
+        return before._again(port=None, host=None, sources=_nothing_like(before), readout=None, tare=None)
 
 
 def _nothing_like(live: Live) -> str:

@@ -33,6 +33,9 @@ Edit: TypeAlias = tuple[Note | None, Note | None]
 #: A row in the view, and as it is in the file; None for one that was changed.
 _Row: TypeAlias = tuple[Note, Note | None]
 
+#: Time of the last change, ns, and size of a table.
+_State: TypeAlias = tuple[int, int] | None
+
 
 class _Changed(Exception):  # noqa: N818  no error
     """Another program has written the table since it was read."""
@@ -60,6 +63,17 @@ class LabelFile:
     def __init__(self, table: Path, names: frozenset[str], begin_us: int = 0, unit_us: float = 1.0) -> None:
         self._named, self.path = table, Path(os.path.realpath(table))
         self._names, self._begin_us, self._unit_us = names, begin_us, unit_us
+        #: The rows as they were read or written last, and what the file was then.
+        self.rows: tuple[Note, ...] = ()
+        self.state: _State = None
+
+    def state_now(self) -> _State:
+        """Return what changes with the table; None where there is none."""
+        try:
+            about = self.path.stat()
+        except OSError:
+            return None
+        return about.st_mtime_ns, about.st_size
 
     def read(self) -> tuple[Note, ...]:
         """Return the rows, also those without a label, in the order of time.
@@ -69,9 +83,10 @@ class LabelFile:
         FormatError : no table of labels (names the line)
         OSError : it cannot be read
         """
-        text = self._text() or b""
+        self.state, text = self.state_now(), self._text() or b""
         rows, _ = rows_of(self.path, lines_of(decoded(self.path, text, marked(self.path, text))))
-        return _in_order(map(self._in_view, rows))
+        self.rows = _in_order(map(self._in_view, rows))
+        return self.rows
 
     def change(self, edits: Sequence[Edit]) -> tuple[tuple[Edit, ...], tuple[Note, ...]]:
         """Carry out edits in the table as it is now, all or none; return what takes them back, and the rows.
@@ -90,7 +105,9 @@ class LabelFile:
                 try:
                     while True:
                         try:
-                            return self._try_to_change(edits)
+                            inverse, self.rows = self._try_to_change(edits)
+                            self.state = self.state_now()
+                            return inverse, self.rows
                         except _Changed:
                             if time.monotonic() > until:
                                 reason = "other programs write it"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from taxel._base.arguments import callback, checked_path, instance, integer, text
@@ -91,15 +92,16 @@ class Panel(contextlib.AbstractContextManager["Panel"]):
             shown = None if is_folder(shown_path) else folder / opened
         if how.rate_hz is not None:
             period_us("rate_hz", how.rate_hz)
-        opening = Opening() if opens is None else Opening(callback("opens", opens), shown, how)
         if not text("labels", labels).isidentifier():
             raise refused("labels", f" is {labels!r}: must be a word, for example steps for NAME.steps.csv")
+        opening = Opening(first=opened, labels=labels)
+        if opens is not None:
+            opening = replace(opening, opens=callback("opens", opens), file=shown, options=how)
         address = text("host", host), integer("port", port, 0, 65_535)
         place = Path.cwd() if folder is None else Path(checked_path("folder", folder)).resolve(strict=True)
         cable = None if control is None else Cable(text("control", control))
-        stated = live is not None and live._registers_stated
         try:
-            self._hub = Hub(live, stated, place, opened, opening, cable, asked=opens is not None, tables=labels)
+            self._hub = Hub(live, place, opening, cable)
             self._server = Server(self._hub, *address)
         except BaseException:
             if cable is not None:

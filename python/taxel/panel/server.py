@@ -13,20 +13,17 @@ import threading
 import time
 from collections.abc import Coroutine
 from concurrent.futures import Future
-from email.utils import formatdate
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, TypeVar, cast
 from urllib.parse import quote
 
 from websockets.asyncio.server import ServerConnection, serve
-from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed, InvalidMessage
 from websockets.http11 import Request, Response
 
 from taxel.panel.hub import Hub
-from taxel.panel.messages import MOST_BYTES
-from taxel.panel.session import Session
+from taxel.panel.requests import Requests
 from taxel.panel.threads import wait_for_threads
 
 _T = TypeVar("_T")
@@ -34,14 +31,17 @@ _T = TypeVar("_T")
 #: The subprotocol, and the prefix of the one that carries the token.
 _PROTOCOL, _TOKEN = "taxel.panel.1", "token."
 
+#: Bytes of a message of a client, at most; 5000 labels are fewer.
+_MOST_BYTES = 1 << 20
+
 #: Clients at a time.
 _MOST_CLIENTS = 64
 
 #: Time from one frame to the next, and without clients from one look at the source to the next, s.
 _FRAME_S, _IDLE_S = 1 / 60, 0.05
 
-#: A client that reads nothing of what waits for it within this time is disconnected, s.
-_READ_WITHIN_S = 5.0
+#: How often a client is asked whether it reads, and how long it may take to answer, s.
+_ASK_S, _ANSWER_S = 5.0, 10.0
 
 #: How long requests that run are waited for when the server ends, s.
 _REQUESTS_S = 2.0
@@ -87,7 +87,7 @@ class _Connection(ServerConnection):
         wrong = self.protocol.handshake_exc
         if not self._is_answered and isinstance(wrong, InvalidMessage) and not isinstance(wrong.__cause__, EOFError):
             self._is_answered = True
-            answer = _answer(HTTPStatus.BAD_REQUEST)
+            answer = self.respond(HTTPStatus.BAD_REQUEST, "")
             answer.headers.update(_HEADERS)
             self.transport.write(answer.serialize())
         super().send_data()
@@ -166,9 +166,9 @@ class Server:
             subprotocols=[_PROTOCOL],  # type: ignore[list-item]
             compression=None,
             write_limit=_WRITE_LIMIT,
-            max_size=MOST_BYTES,
-            ping_interval=10,
-            ping_timeout=20,
+            max_size=_MOST_BYTES,
+            ping_interval=_ASK_S,
+            ping_timeout=_ANSWER_S,
             close_timeout=1,
             server_header=None,
             logger=_QUIET,
@@ -186,20 +186,26 @@ class Server:
 
     # ---------------------------------------------------------------------------------------------- access
 
-    def _gate(self, _connection: ServerConnection, request: Request) -> Response | None:
+    def _gate(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a file, or refuse a web socket; None lets it in."""
-        hosts = request.headers.get_all("Host")
-        if len(hosts) != 1 or not self._accepts(hosts[0]):
-            return _answer(HTTPStatus.MISDIRECTED_REQUEST)
-        if request.method not in ("GET", "HEAD"):
-            return _answer(HTTPStatus.METHOD_NOT_ALLOWED)
-        path = request.path.partition("?")[0]
-        if path == "/socket":
-            return self._refusal(request, hosts[0])
+        hosts, path = request.headers.get_all("Host"), request.path.partition("?")[0]
         media, file = _FILES.get("index.html" if path == "/" else path.removeprefix("/"), ("", None))
-        if file is None:
-            return _answer(HTTPStatus.NOT_FOUND)
-        return _answer(HTTPStatus.OK, media, file.read_bytes(), with_body=request.method == "GET")
+        if len(hosts) != 1 or not self._accepts(hosts[0]):
+            refused = HTTPStatus.MISDIRECTED_REQUEST
+        elif request.method not in ("GET", "HEAD"):
+            refused = HTTPStatus.METHOD_NOT_ALLOWED
+        elif path == "/socket":
+            return self._refusal(connection, request, hosts[0])
+        elif file is None:
+            refused = HTTPStatus.NOT_FOUND
+        else:
+            answer, body = connection.respond(HTTPStatus.OK, ""), file.read_bytes()
+            for name, value in (("Content-Type", media), ("Content-Length", str(len(body)))):
+                del answer.headers[name]
+                answer.headers[name] = value
+            answer.body = body if request.method == "GET" else b""
+            return answer
+        return connection.respond(refused, "")
 
     def _accepts(self, host: str) -> bool:
         """Return whether a request may name this host: of names localhost alone, as others may resolve to it."""
@@ -214,15 +220,16 @@ class Server:
             return False
         return port == str(self.address[1])
 
-    def _refusal(self, request: Request, host: str) -> Response | None:
+    def _refusal(self, connection: ServerConnection, request: Request, host: str) -> Response | None:
         if request.headers.get_all("Origin") != [f"http://{host}"]:
-            return _answer(HTTPStatus.FORBIDDEN)
+            return connection.respond(HTTPStatus.FORBIDDEN, "")
         offered = [one.strip() for one in ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")]
         tokens = [one.removeprefix(_TOKEN) for one in offered if one.startswith(_TOKEN)]
         right = [hmac.compare_digest(token.encode(), self.token.encode()) for token in tokens]
         if _PROTOCOL not in offered or not any(right):
-            return _answer(HTTPStatus.UNAUTHORIZED)
-        return _answer(HTTPStatus.SERVICE_UNAVAILABLE) if len(self._hub.sessions) >= _MOST_CLIENTS else None
+            return connection.respond(HTTPStatus.UNAUTHORIZED, "")
+        is_full = len(self._hub.sessions) >= _MOST_CLIENTS
+        return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "") if is_full else None
 
     def _complete(self, _connection: ServerConnection, _request: Request, response: Response) -> None:
         """Add the headers that every answer has."""
@@ -231,7 +238,7 @@ class Server:
     # ---------------------------------------------------------------------------------------------- clients
 
     async def _client(self, connection: ServerConnection) -> None:
-        session = Session(self._hub, connection)
+        session = Requests(self._hub, connection)
         self._hub.join(session)
         self._clients.add(this := cast("asyncio.Task[None]", asyncio.current_task()))
         try:
@@ -258,22 +265,4 @@ class Server:
             await asyncio.sleep(due - time.monotonic())
             await self._hub.tell()
             for session in list(self._hub.sessions):
-                waiting = session.waiting()
-                if waiting and session.unread_s(waiting, due) > _READ_WITHIN_S:
-                    session.abort()
-                elif session.credits and not waiting and not session.answers:
-                    with contextlib.suppress(ConnectionClosed):
-                        await session.send_frame()
-
-
-def _answer(status: HTTPStatus, media: str = "text/plain", body: bytes = b"", *, with_body: bool = True) -> Response:
-    """Return an answer of HTTP, after which the connection closes."""
-    headers = Headers(
-        {
-            "Date": formatdate(usegmt=True),
-            "Connection": "close",
-            "Content-Length": str(len(body)),
-            "Content-Type": media,
-        }
-    )
-    return Response(status.value, status.phrase, headers, body if with_body else b"")
+                await session.send_frame()

@@ -1,73 +1,35 @@
-"""The session of a client: its requests, each a method, and what it is sent."""
+"""The session of a client: what it is told at first, and the answers to its requests."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
-import math
 import time
 from collections import deque
 from collections.abc import Coroutine
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from msgspec import Meta, Struct
-from websockets.exceptions import ConnectionClosed
-
-from taxel import _core
 from taxel._base.errors import refused
 from taxel._core import ProblemError
-from taxel.device import ports
-from taxel.labels import Note
-from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
-from taxel.panel.folder import Shown
+from taxel.panel.client import Client
+from taxel.panel.declared import Request
 from taxel.panel.label_file import Edit
-from taxel.panel.messages import text_of
-from taxel.panel.refusals import at_field, field_of, reason
-from taxel.panel.regions import Drawn, Measure, Picture, RegionLoads, read_beside, regions_beside, write_beside
-from taxel.panel.shown_files import judged
-from taxel.panel.threads import in_thread
+from taxel.panel.refusals import field_of, reason
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
 
     from taxel.panel.hub import Hub
 
-#: Frames on their way, labels of a request, long requests at a time, changes of labels that can be undone.
-_MOST_CREDITS, _MOST_LABELS, _MOST_LONG, _MOST_CHANGES = 8, 5000, 8, 1000
-#: Regions of a recording, and columns of their curves.
-_MOST_REGIONS, _MOST_COLUMNS = 200, 2048
-#: Characters of a layout.
-_MOST_LAYOUT = 500_000
+#: Long requests at a time, and changes of labels that can be undone.
+_MOST_LONG, _MOST_CHANGES = 8, 1000
 
 #: A client with more refused requests than the first within the second is disconnected, s.
 _MOST_REFUSED, _REFUSED_WITHIN_S = 100, 10.0
 
-#: A client that does not read as many bytes that wait for it is disconnected.
-_MOST_WAITING = 1 << 21
-#: How long the lines of a sensor are looked at, s.
-_LOOK_S = 2.0
 
-
-class Row(Struct, forbid_unknown_fields=True):
-    """Hold a label as the page has it."""
-
-    label: Annotated[str, line(200, least=0)]
-    t_us: Time
-    source: Annotated[str, line(64, least=0)]
-    trial: Annotated[str, line(255, least=0)]
-    replaces_us: Time | None = None
-
-
-class Change(Struct, forbid_unknown_fields=True):
-    """Hold a change of labels: `new` in the place of `old`; without `old` a new label, without `new` a deletion."""
-
-    old: Row | None = None
-    new: Row | None = None
-
-
-class Session:
-    """Serve a client.
+class Session(Client):
+    """Answer the requests of a client.
 
     Parameters
     ----------
@@ -77,87 +39,32 @@ class Session:
         The client's web socket.
     """
 
+    #: The requests by name.
+    requests: ClassVar[dict[str, Request]] = {}
+
     def __init__(self, hub: Hub, connection: ServerConnection) -> None:
-        self._hub, self._connection = hub, connection
-        self.view = _core.PanelView(hub.source)
-        #: The recording that is shown; None: the live source.
-        self.shown: Shown | None = None
-        #: Frames that may be sent; none while a request is answered, so that a frame shows what was answered before it.
-        self.credits, self.answers = 0, False
-        self._advancing: asyncio.Task[None] | None = None
+        super().__init__(connection, hub.source)
+        self._hub = hub
         self._long: set[asyncio.Task[None]] = set()
         self._refusals: deque[float] = deque()
         #: What takes the newest changes of labels back, by the recording's name.
         self._changes: deque[tuple[str, tuple[Edit, ...]]] = deque(maxlen=_MOST_CHANGES)
-        self._unread = (0, 0.0)
-
-    # ---------------------------------------------------------------------------------------------- sending
 
     async def greet(self) -> None:
         """Say what the panel shows."""
         hub = self._hub
         await hub.prepare()
         for message in (
-            hub.hello(),
+            hub.hello(self.follows),
             hub.presets(),
             hub.registers(),
             hub.recorder.message(),
             await hub.recordings(),
-            hub.zeroed(),
+            hub.zeroed(self.follows),
         ):
             await self.say(message)
         for text in [] if hub.source is None else hub.source.latest_detections():
             await self.say(text)
-
-    async def say(self, message: dict[str, Any] | str) -> None:
-        """Send a message; a client that does not read is disconnected, and one that has left is no error."""
-        if self.waiting() > _MOST_WAITING:
-            return self.abort()
-        text = message if isinstance(message, str) else await text_of(message)
-        with contextlib.suppress(ConnectionClosed):
-            await self._connection.send(text)
-        return None
-
-    def waiting(self) -> int:
-        """Return how many bytes wait for the client."""
-        return self._connection.transport.get_write_buffer_size()
-
-    def unread_s(self, waiting: int, now: float) -> float:
-        """Return for how long the client has read nothing of what waits for it, s."""
-        before, since = self._unread
-        if before == 0 or waiting < before:
-            since = now
-        self._unread = (waiting, since)
-        return now - since
-
-    def abort(self) -> None:
-        """Disconnect the client at once."""
-        self._connection.transport.abort()
-
-    async def send_frame(self) -> None:
-        """Send a frame, if there is a new one; what takes long before it is done in another thread."""
-        self._unread = (0, 0.0)
-        made = self.view.frame()
-        if made is not None:
-            frame, texts = made
-            self.credits -= 1
-            await self._connection.send(frame)
-            for text in texts:
-                await self.say(text)
-        if self.view.moves() and self._advancing is None:
-            self._advancing = asyncio.create_task(self._advance())
-
-    async def _advance(self) -> None:
-        try:
-            if await in_thread(self.view.advance):
-                await self._say_transport()
-        finally:
-            self._advancing = None
-
-    async def _say_transport(self) -> None:
-        state, speed, t_us = self.view.transport()
-        source = None if self.shown is None else self.shown.name
-        await self.say({"type": "transport", "source": source, "state": state, "speed": speed, "t_us": t_us})
 
     # ---------------------------------------------------------------------------------------------- answering
 
@@ -165,7 +72,7 @@ class Session:
         """Carry out a request; return whether the client may go on."""
         number, kind = None, ""
         try:
-            number, kind, asked, keys = _parsed(text)
+            number, kind, asked, keys = self._parsed(text)
             arguments = asked.read(keys)
             if asked.is_long and len(self._long) >= _MOST_LONG:
                 raise ProblemError("too many requests at a time: wait for their answers")
@@ -175,10 +82,9 @@ class Session:
         work = self._carry_out(asked.method(self, **arguments), number, kind)
         if asked.is_long:
             task = asyncio.create_task(work)
-            # It goes on when the client has left.
-            for tasks in (self._long, self._hub.tasks):
-                tasks.add(task)
-                task.add_done_callback(tasks.discard)
+            self._long.add(task)
+            task.add_done_callback(self._long.discard)
+            self._hub.keep(task)
         else:
             self.answers = True
             await work
@@ -205,438 +111,18 @@ class Session:
             self._refusals.popleft()
         return len(self._refusals) <= _MOST_REFUSED
 
-    # ------------------------------------------------------------------------------------------ requests: the view
-
-    @request
-    async def credit(self, n: Annotated[int, whole(1, _MOST_CREDITS)]) -> None:
-        """Give credits for `n` more frames."""
-        self.credits = min(_MOST_CREDITS, self.credits + n)
-
-    @request
-    async def watch(
-        self, taxel: tuple[Annotated[int, whole(0, 65_535)], Annotated[int, whole(0, 65_535)]] | None
-    ) -> None:
-        """Send the history of this taxel; null for none."""
-        await in_thread(self.view.watch, taxel)
-
-    @request
-    async def zoom(self, column_us: Annotated[int, whole(1, 2**40)], end_us: Time | None = None) -> None:
-        """Send columns of time of this width, for this view: 125 us times a power of two; 4 ms or more if it follows.
-
-        With `end_us`, in a view that does not follow the newest, the columns end there, wherever the view's time is,
-        and stay until the next `zoom`; a view that plays beyond takes them along. Without it they end at the view's
-        time.
-        """
-        await in_thread(self.view.zoom, column_us, end_us)
-
-    @request
-    async def seek(self, t_us: Time) -> None:
-        """Show this time: of the recording, or while live within the reach; stops playing."""
-        await in_thread(self.view.seek, t_us)
-        await self._say_transport()
-
-    @request
-    async def play(self, speed: Annotated[float, Meta(ge=0.001, le=100)] | None = None) -> None:
-        """Play from here at this speed (board time over real time; the last one where left out)."""
-        await in_thread(self.view.play, speed)
-        await self._say_transport()
-
-    @request
-    async def pause(self) -> None:
-        """Pause the view. Acquisition continues."""
-        await in_thread(self.view.pause)
-        await self._say_transport()
-
-    @request
-    async def step(self, frames: Annotated[int, whole(-1000, 1000)]) -> None:
-        """Go forward or back (negative) by this number of time stamps with events; stops playing."""
-        await in_thread(self.view.step, frames)
-        await self._say_transport()
-
-    @request
-    async def live(self) -> None:
-        """Follow the live source; leaves a recording."""
-        await in_thread(self.view.follow)
-        self.shown = None
-        await self._say_transport()
-
-    @request
-    async def open(self, name: Annotated[str, line(110)], trial: Annotated[str, line(255)] | None = None) -> None:
-        """Show a recording of the folder at its beginning, paused: any file that `taxel.open` reads.
-
-        Of a file with several trials the one that `trial` names, or the first. `opened`, `labels` and `transport`
-        follow.
-        """
-        with at_field("name"):
-            shown = await self._hub.folder.open(name, trial)
-            await self._show(shown)
-
-    @long_request
-    async def look(
-        self,
-        name: Annotated[str, line(300)],
-        text: Annotated[str, Meta(max_length=_MOST_LAYOUT)] | None = None,
-        changes: dict[str, Any] | None = None,
-    ) -> None:
-        """Send `look` and `seen`: what the columns or axes of a file of another program are, and a picture of it.
-
-        By a layout as `text`, as `look` has it, or else by that of the file, with the `changes` that `look` offers.
-        """
-        with at_field("name"):
-            message, whole = await in_thread(self._hub.folder.look, name, text, changes or {})
-        await self.say(message)
-        if whole is not None:
-            await self.say(await in_thread(self._hub.folder.seen, name, whole))
-
-    @request
-    async def lay(
-        self,
-        name: Annotated[str, line(110)],
-        text: Annotated[str, Meta(max_length=_MOST_LAYOUT)],
-        folder: bool = False,
-        replace: bool = False,
-    ) -> None:
-        """Write a layout to NAME.layout.toml beside a file of another program, or to layout.toml for its folder.
-
-        Refused at `replace` if that file is there, unless `replace` is true.
-        """
-        await in_thread(self._hub.folder.lay, name, text, folder=folder, replace=replace)
-
-    async def _show(self, shown: Shown) -> None:
-        trouble = None
+    def _parsed(self, text: str) -> tuple[int | str | None, str, Request, dict[str, Any]]:
+        """Return number, name and keys of a request, and how it is carried out."""
         try:
-            if await self._hub.labels.read(shown):
-                await self._hub.say_labels(shown.name)
-        except (OSError, _core.Error) as error:
-            trouble = reason(error)
-        await in_thread(self.view.show, shown.recording)
-        self.shown = shown
-        opened = {
-            "type": "opened",
-            "name": shown.name,
-            "bytes": shown.state.size,
-            **shown.contents,
-        }
-        await self.say(opened)
-        await self.say(self._hub.labels.message(shown.name))
-        await self._say_transport()
-        if trouble is not None:
-            await self.say({"type": "warning", "text": trouble})
-
-    @long_request
-    async def values(self, t_us: Time) -> None:
-        """Send `values`: the sums, areas and centres at this time of what this view shows, and of the watched taxel."""
-        await self.say(await in_thread(self.view.values, t_us))
-
-    @request
-    async def overview(self) -> None:
-        """Send `overview` of what this view shows: events and the greatest force over time, for the strip."""
-        if self.shown is not None:
-            await self.say(await in_thread(self.shown.recording.overview, self.shown.name))
-        elif self._hub.source is not None:
-            await self.say(await in_thread(self._hub.source.overview))
-        else:
-            raise ProblemError("nothing is shown: open a recording first")
-
-    @long_request
-    async def health(self) -> None:
-        """Send `health` of what this view shows, by the rules of `taxel info`."""
-        if self.shown is None:
-            found = await in_thread(judged, await in_thread(self._hub.needed_source().activity))
-        elif (activity := await in_thread(self.shown.recording.activity)) is not None:
-            found = await in_thread(judged, activity)
-        else:
-            found = await in_thread(self._hub.folder.files.judge, self.shown.path, self.shown.asked)
-        await self.say({"type": "health", "source": None if self.shown is None else self.shown.name, **found})
-
-    # ------------------------------------------------------------------------------------------ requests: the board
-
-    @request
-    async def zero(
-        self,
-        taxels: Annotated[
-            list[tuple[Annotated[int, whole(0, 65_535)], Annotated[int, whole(0, 65_535)]]],
-            Meta(min_length=1, max_length=1 << 16),
-        ],
-    ) -> None:
-        """Take the present values of these taxels as their rest from now on, also for the readout; all or none.
-
-        The recording notes the time and the rests before and after. `zeroed` follows.
-        """
-        columns, rows = zip(*taxels, strict=True)
-        await in_thread(self._hub.needed_live().zero, columns, rows)
-
-    @request
-    async def set_(self, values: dict[str, Any]) -> None:
-        """Write registers, by taxel's names or the manual's, in the registers' own units; all or none."""
-        array = self._hub.needed_live().array
-        await self._hub.on_board(lambda: self._hub.board.set(values, array))
-
-    @request
-    async def read(self) -> None:
-        """Read all registers back from the board."""
-        await self._hub.on_board(self._hub.board.read)
-
-    @request
-    async def preset_apply(self, name: Annotated[str, line(60)]) -> None:
-        """Write the registers of one of the manual's presets, which does not change the version of the wire."""
-        array = self._hub.needed_live().array
-        await self._hub.on_board(lambda: self._hub.board.apply(name, array))
-
-    @request
-    async def ports(self) -> None:
-        """Send `ports`: the serial ports that the system knows, USB devices first."""
-        found = await in_thread(ports)
-        texts = [", ".join(filter(None, (port.product, port.maker, port.serial))) for port in found]
-        listed = [{"place": port.place, "about": about} for port, about in zip(found, texts, strict=True)]
-        await self.say({"type": "ports", "ports": listed})
-
-    @long_request
-    async def guess(self, place: Annotated[str, line(255)], baud: Annotated[int, whole(*_core.BAUDS)]) -> None:
-        """Send `look` and `seen` of the first lines that arrive within two seconds; their name is the source.
-
-        `place` is a serial port or server (HOST:PORT), a file of the folder, a pipe, or as ``lines+udp:HOST:PORT``.
-        """
-        with at_field("place"):
-            source = await in_thread(self._hub.folder.hear, place, baud, _LOOK_S)
-        await self.look(source)
-
-    @request
-    async def connect(
-        self,
-        source: Annotated[str, line(1024)],
-        text: Annotated[str, Meta(max_length=_MOST_LAYOUT)] | None = None,
-    ) -> None:
-        """Receive the lines of numbers of a sensor instead, for all clients; refused while recording.
-
-        What of them is what says a layout as `text`, as `look` has it, if the source was looked at, or else `source`.
-        """
-        if text is None and not source.startswith("serial:"):
-            raise refused("source", ": must begin with serial:, or be one that was looked at")
-        with at_field("source"):
-            whole = source if text is None else await in_thread(self._hub.folder.looks.source, source, text)
-            await self._hub.read_source(whole)
-
-    @request
-    async def disconnect(self) -> None:
-        """Receive nothing any more, for all clients: the port is free for other programs."""
-        await self._hub.read_nothing()
-
-    # ------------------------------------------------------------------------------------------ requests: recordings
-
-    @request
-    async def recordings(self) -> None:
-        """Send `recordings`: those of the folder, and its readouts."""
-        await self.say(await self._hub.recordings())
-
-    @request
-    async def record(
-        self,
-        name: Annotated[str, line(100)],
-        label: Annotated[str, line(200)] | None = None,
-        length_s: Annotated[float, Meta(ge=0.01, le=86_400)] | None = None,
-    ) -> None:
-        """Record to NAME.mcap, for `length_s`, or else until `stop`.
-
-        `label` is written into the recording as a note without a time: it is about the whole, and is not an event.
-        """
-        await self._hub.recorder.begin(name, label, length_s)
-
-    @request
-    async def stop(self) -> None:
-        """End the recording."""
-        self._hub.recorder.end()
-
-    @request
-    async def note(self, text: Annotated[str, line(200)]) -> None:
-        """Write a note into the recording that runs, with the time of now."""
-        await in_thread(self._hub.needed_live().note, text)
-
-    @long_request
-    async def cut(self, start_us: Time, stop_us: Time, name: Annotated[str, line(100)]) -> None:
-        """Write a stretch of the recording shown to a new file of the folder: what `taxel cut` does."""
-        shown, out = self._needed("cut"), self._hub.folder.file(name)
-        if start_us >= stop_us:
-            raise refused("stop_us", ": must be after start_us")
-        if out.exists():
-            raise refused("name", f": {name} exists already; choose another name")
-        # The first frame from the start on, and the first after the end.
-        begin, end = (math.ceil(t_us / shown.us) for t_us in (start_us, stop_us))
-        lost = await in_thread(self._hub.folder.files.cut, shown.path, shown.asked, out, begin, end)
-        await self._hub.say(await self._hub.recordings())
-        await self.say({"type": "cut", "name": name, "lost": lost})
-
-    # ------------------------------------------------------------------------------------------ requests: regions
-
-    @long_request
-    async def regions(self) -> None:
-        """Send `regions`: those of the file beside the recording shown, NAME.regions.json."""
-        shown, loads = await self._loads()
-        found = loads.drawn(await in_thread(read_beside, shown.path))
-        file = regions_beside(shown.path).name
-        await self.say({"type": "regions", "source": shown.name, "file": file, "units": loads.units, "regions": found})
-
-    @long_request
-    async def loads(
-        self,
-        regions: Annotated[list[Drawn], Meta(max_length=_MOST_REGIONS)],
-        measure: Measure,
-        first: Annotated[int, whole(-(2**52), 2**52)],
-        count: Annotated[int, whole(1, _MOST_COLUMNS)],
-        column_us: Annotated[int, whole(1, 2**40)],
-    ) -> None:
-        """Send `loads`: least and greatest of a measure of each region in columns of time; the first is `first`.
-
-        Column k begins at k times its width. The load is the force, or the sum of the values where no force is known.
-        """
-        shown, loads = await self._loads()
-        curves = await in_thread(loads.curves, regions, measure, first, count, column_us)
-        begin = {"type": "loads", "source": shown.name, "first": first, "count": count, "column_us": column_us}
-        await self.say(begin | {"measure": measure, "curves": curves})
-
-    @long_request
-    async def picture(self, kind: Picture, start_us: Time, stop_us: Time) -> None:
-        """Send `picture`: the largest or the mean values of a time, isobars, and the path of the centre."""
-        shown, loads = await self._loads()
-        found = await in_thread(loads.picture, kind, start_us, stop_us)
-        await self.say(
-            {"type": "picture", "source": shown.name, "kind": kind, "start_us": start_us, "stop_us": stop_us, **found}
-        )
-
-    @request
-    async def write_regions(
-        self, regions: Annotated[list[Drawn], Meta(min_length=1, max_length=_MOST_REGIONS)], replace: bool = False
-    ) -> None:
-        """Write the regions to NAME.regions.json beside the recording shown.
-
-        Refused at `replace` if that file is there, unless `replace` is true.
-        """
-        shown, loads = await self._loads()
-        await in_thread(write_beside, shown.path, loads.regions(regions), replace=replace)
-
-    async def _loads(self) -> tuple[Shown, RegionLoads]:
-        shown = self._needed("regions")
-        return shown, await in_thread(self._hub.folder.files.loads, shown.path, shown.asked, shown.us)
-
-    # ------------------------------------------------------------------------------------------ requests: labels
-
-    @request
-    async def change(self, changes: Annotated[list[Change], Meta(min_length=1, max_length=_MOST_LABELS)]) -> None:
-        """Change labels of the recording shown, or of the one that runs; all or none.
-
-        `old` is a label as `labels` has it. A label with `replaces_us` replaces the recording's own note of that time,
-        which counts no more; if it is deleted, the note does not count again until a label replaces it. Refused for a
-        time outside the recording, and where another window or program has changed the label since.
-        """
-        trial = "" if self.shown is None else self.shown.trial
-        if any(one.new is not None and not one.new.label.strip() for one in changes):
-            raise refused("label", ": must be a text of 1 to 200 characters")
-        edits = [(_note(one.old, None), _note(one.new, trial)) for one in changes]
-        await self._change(edits)
-
-    async def _change(self, edits: list[Edit]) -> None:
-        name = self._labelled()
-        inverse = await self._hub.labels.change(name, self.shown, edits)
-        if inverse:
-            self._changes.append((name, inverse))
-        await self._hub.say_labels(name)
-
-    @request
-    async def undo(self) -> None:
-        """Take back the last change of labels that this client made in the recording that it shows or that runs."""
-        name = self._labelled()
-        made = next((change for change in reversed(self._changes) if change[0] == name), None)
-        if made is None:
-            raise ProblemError("nothing to undo: no label of this recording was changed in this window")
-        self._changes.remove(made)
-        await self._hub.labels.take_back(name, made[1])
-        await self._hub.say_labels(name)
-
-    def _labelled(self) -> str:
-        """Return the recording whose labels are changed."""
-        name = self._hub.recorder.file if self.shown is None else self.shown.name
-        if name is None:
-            raise ProblemError("a label needs a recording: open a recording, or start one")
-        return name
-
-    # ------------------------------------------------------------------------------------------ requests: readouts
-
-    @long_request
-    async def train(self) -> None:
-        """Train a readout on the labels of the recording shown, as `taxel train --labels notes` does.
-
-        The readout replaces NAME.readout.json beside the recording. `training` comes at each step, `trained` before
-        the answer, when the training has ended. One training runs at a time.
-        """
-        shown = self._needed("train")
-        readout, us = readout_of(shown.name), shown.us
-        loop = asyncio.get_running_loop()
-
-        def progress(text: str) -> None:
-            asyncio.run_coroutine_threadsafe(self.say({"type": "training", "text": text}), loop)
-
-        trained = await in_thread(self._hub.training.train, shown.path, self._hub.folder.file(readout), progress)
-        mistakes = [mistake | {"t_us": mistake["t_us"] * us} for mistake in trained.pop("mistakes")]
-        await self._hub.say(await self._hub.recordings())
-        await self.say({"type": "trained", "name": shown.name, "readout": readout, "mistakes": mistakes, **trained})
-
-    @request
-    async def train_stop(self) -> None:
-        """End the training that runs: it is refused, and writes nothing."""
-        await in_thread(self._hub.training.end)
-
-    @long_request
-    async def read_out(self, readout: Annotated[str, line(110)], use: Annotated[str, line(10)] = "better") -> None:
-        """Read what this view shows with a readout or a plain rule of the folder.
-
-        A recording: `detections` follows. The live source: from now on, for all clients; it begins again. A readout
-        that needs a tare uses that of the command, else what the taxels hold now. `use`: better, rule or neuron.
-        """
-        with at_field("readout"):
-            path = self._hub.folder.file(readout)
-        shown = self.shown
-        if shown is None:
-            return await self._hub.read_out(path, use)
-        labels, found = await in_thread(self._hub.training.detect, shown.path, shown.asked, path, use)
-        message = {"type": "detections", "source": shown.name, "readout": readout, "labels": labels}
-        await self.say(message | {"detections": found})
-        return None
-
-    def _needed(self, action: str) -> Shown:
-        if self.shown is None:
-            raise ProblemError(f"{action}: open a recording first")
-        return self.shown
-
-
-#: The requests by name.
-REQUESTS = requests_of(Session)
-
-
-def readout_of(recording: str) -> str:
-    """Return the name of the readout that is trained on a recording."""
-    return f"{recording.rpartition('.')[0] or recording}.readout.json"
-
-
-def _parsed(text: str) -> tuple[int | str | None, str, Request, dict[str, Any]]:
-    """Return number, name and keys of a request, and how it is carried out."""
-    try:
-        keys = json.loads(text)
-    except (ValueError, RecursionError):
-        keys = None
-    if not isinstance(keys, dict):
-        raise ProblemError("not a JSON object")
-    number, kind = keys.pop("id", None), keys.pop("type", None)
-    if number is not None and type(number) is not int and not (isinstance(number, str) and len(number) <= 64):
-        raise refused("id", ": must be a whole number, or a text of 64 characters at most")
-    asked = REQUESTS.get(kind) if isinstance(kind, str) else None
-    if asked is None:
-        raise refused("type", f": must be one of {', '.join(REQUESTS)}")
-    return number, kind, asked, keys
-
-
-def _note(row: Row | None, trial: str | None) -> Note | None:
-    """Return a label of the page as a table holds it; a new one without a trial is of the one that is shown."""
-    if row is None:
-        return None
-    of_trial = row.trial or trial or ""
-    return Note(row.label.strip(), row.t_us, 0, of_trial, row.source, row.replaces_us)
+            keys = json.loads(text)
+        except (ValueError, RecursionError):
+            keys = None
+        if not isinstance(keys, dict):
+            raise ProblemError("not a JSON object")
+        number, kind = keys.pop("id", None), keys.pop("type", None)
+        if number is not None and type(number) is not int and not (isinstance(number, str) and len(number) <= 64):
+            raise refused("id", ": must be a whole number, or a text of 64 characters at most")
+        asked = self.requests.get(kind) if isinstance(kind, str) else None
+        if asked is None:
+            raise refused("type", f": must be one of {', '.join(self.requests)}")
+        return number, kind, asked, keys

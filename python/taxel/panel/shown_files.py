@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,18 +81,8 @@ class ReadFrames:
     number_us: int | None
 
 
-@dataclass(frozen=True)
-class Viewed:
-    """A recording for its view, and what the message `opened` says of it.
-
-    Parameters
-    ----------
-    recording : PanelRecording
-    contents : dict
-    """
-
-    recording: _core.PanelRecording
-    contents: dict[str, Any]
+#: A recording for its view, and what the message `opened` says of it.
+Viewed: TypeAlias = tuple[_core.PanelRecording, dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -108,15 +98,22 @@ class Opening:
     options : FullReading
         Those by which it is opened so. Labels of numbered frames that have times by its `rate_hz` are in numbers of
         frames.
+    first : str, optional
+        The name of the recording that is shown first.
+    labels : str
+        The end of the names of the tables of labels: "notes" for NAME.notes.csv.
     """
 
-    opens: Callable[[Path], Sequence[Recording]] = FullReading().open_trials
+    opens: Callable[[Path], Sequence[Recording]] | None = None
     file: Path | None = None
     options: FullReading = field(default_factory=FullReading)
+    first: str | None = None
+    labels: str = "notes"
 
     def open(self, file: Path) -> Sequence[Recording]:
         """Open a file."""
-        return self.opens(file) if self.file in (None, file) else FullReading().open_trials(file)
+        opens = FullReading().open_trials if self.opens is None or self.file not in (None, file) else self.opens
+        return opens(file)
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""
@@ -230,27 +227,19 @@ class ShownFiles:
             raise ProblemError(f"{path.name}: contains no trial {trial}")
         return recordings[0 if trial is None else names.index(trial)], names
 
-    def read(self, path: Path, trial: str | None, *, by_options: bool) -> Viewed:
-        """Read a recording for its view.
-
-        Parameters
-        ----------
-        path : path
-        trial : str or None
-            Of a file with several; default: the first.
-        by_options : bool
-            Whether also a board's .mcap is read by the options of `Opening`, not as it is.
-        """
-        board = None if by_options else _board(path)
+    def read(self, path: Path, trial: str | None) -> Viewed:
+        """Read a recording for its view: of a file with several trials one of them, by default the first."""
+        # A board's .mcap is read as it is, but the one that is shown first by the options, if there are any.
+        board = None if self._opening.opens and path.name == self._opening.first else _board(path)
         if board is not None:
             return board
         recording, names = self.opened(path, trial)
         are_events = not recording.is_several and recording.has_events
-        viewed = _events(recording) if are_events else _frames(recording)
-        viewed.contents["has_roles"] = takes_layout(recording.path)
+        shown, contents = _events(recording) if are_events else _frames(recording)
+        contents["has_roles"] = takes_layout(recording.path)
         if not are_events:
-            viewed.contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
-        return viewed
+            contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
+        return shown, contents
 
     def judge(self, path: Path, trial: str | None) -> dict[str, Any]:
         """Return what `judged` does, of a recording of frames; its taxels are in the array that is shown."""
@@ -290,13 +279,9 @@ class ShownFiles:
 
 def _sources(recording: Recording) -> dict[str, Recording]:
     """Return the sensors of a recording of frames: its sources, or itself."""
-    several = recording.is_several
-    sensors = recording.sources if several else {recording.label or "board": recording}
-    return (
-        {n: sensor for n, sensor in sensors.items() if not sensor.has_events and not sensor.is_stream}
-        if several
-        else sensors
-    )
+    if not recording.is_several:
+        return {recording.label or "board": recording}
+    return {n: sensor for n, sensor in recording.sources.items() if not sensor.has_events and not sensor.is_stream}
 
 
 def _array_of(frames: dict[str, Frames]) -> tuple[Array, list[int]]:
@@ -325,7 +310,7 @@ def _board(path: Path) -> Viewed | None:
         registers=None if values is None else Registers._of_file(values, Array._from_geometry(header["array"])),
         zeroed=((each["x"], each["y"], each["t"], each["rest"], each["before"]) for _, each in remarks.zeroings),
     )
-    return Viewed(shown, contents | {"pace": pace})
+    return shown, contents | {"pace": pace}
 
 
 def _events(recording: Recording) -> Viewed:
@@ -348,7 +333,7 @@ def _events(recording: Recording) -> Viewed:
         registers=registers,
         zeroed=((each.x, each.y, each.t, each.rest, each.before) for each in recording.zeroings),
     )
-    return Viewed(shown, contents)
+    return shown, contents
 
 
 def _contents(
@@ -375,7 +360,7 @@ def _contents(
     us = recording.times()[2]
     return {
         **recording.opened(),
-        "verdict": verdict,
+        "verdict": str(verdict),
         "pace": None,
         "has_roles": False,
         "registers": None if registers is None else registers._held,
@@ -417,7 +402,7 @@ def _frames(recording: Recording) -> Viewed:
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
     read_frames = ReadFrames(array, parts, units.pop(), None if us == 1 else us)
     shown = _core.PanelRecording.of_frames(read_frames, recording.path.parent, available() // _MEMORY_SHARE)
-    return Viewed(shown, _contents(shown, _verdict(recording), sorted_notes, found))
+    return shown, _contents(shown, _verdict(recording), sorted_notes, found)
 
 
 def _labels_beside(recording: Recording, begin_us: int) -> set[tuple[int | None, str]]:

@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import matplotlib as mpl
 
@@ -32,9 +32,6 @@ from taxel.options import FullReading
 from taxel.report import compared
 from taxel.report.svg import STYLE, image
 from taxel.tasks.train import train
-
-if TYPE_CHECKING:
-    from taxel.tasks.train_result import Training
 
 __all__ = ["run"]
 
@@ -61,7 +58,10 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
         raise ProblemError(
             f"no label is learnt, so nothing is written: {why}. Is each label at its event, and each event labelled?"
         )
-    pictures = [*_pictures(training)]
+    with mpl.rc_context(STYLE):
+        figure = compared.nearest(training.outcomes, training.readout.labels)
+        title = "Each nearest detection minus its label, over time"
+        pictures = [] if figure is None else [{"title": title, "svg": image(figure)}]
     training.readout.save(request["out"], overwrite=True)
     found = training.to_dict()
     found["warnings"] = [*dict.fromkeys([*warnings, *found["warnings"]])]
@@ -72,13 +72,6 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
         "command": training.command(request["out"]),
         "pictures": pictures,
     }
-
-
-def _pictures(training: Training) -> Iterator[dict[str, str]]:
-    """Yield the picture of labels beside detections, where there is one."""
-    with mpl.rc_context(STYLE):
-        if (figure := compared.nearest(training.outcomes, training.readout.labels)) is not None:
-            yield {"title": "Each nearest detection minus its label, over time", "svg": image(figure)}
 
 
 def _say(line: Mapping[str, Any]) -> None:

@@ -35,7 +35,7 @@ class Version2:
     Parameters
     ----------
     board : int, 0 to 65535
-        Number of the board: together with the sender's address it identifies a source.
+        Number of the board in version 2 of the wire: together with the sender's address it identifies a source.
     seed : int, 0 to 65535
         Number of the first session; each reset increases it by one.
     hold_us : int, us
@@ -57,20 +57,11 @@ class Version2:
     10000
     """
 
-    board: int = option(0, "Version 2 of the wire: the board's number.", least=0, most=65_535)
-    seed: int = option(1, "Version 2 of the wire: the number of the first session.", least=0, most=65_535)
-    hold_us: int = option(
-        0, "Version 2 of the wire: how long events wait to share a datagram, ms.", least=0, most=30_000
-    )
-    heartbeat_us: int = option(
-        10_000, "Version 2 of the wire: interval of heartbeats while nothing happens, ms.", least=0, most=10**9
-    )
-    states_us: int = option(
-        1_000_000,
-        "Version 2 of the wire: interval at which each taxel's value is repeated, ms; 0: never.",
-        least=0,
-        most=10**9,
-    )
+    board: int = option(0, least=0, most=65_535)
+    seed: int = option(1, least=0, most=65_535)
+    hold_us: int = option(0, least=0, most=30_000)
+    heartbeat_us: int = option(10_000, least=0, most=10**9)
+    states_us: int = option(1_000_000, least=0, most=10**9)
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -17,7 +17,6 @@ from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.replay import Replay
 from taxel.simulate.trouble import Faults, Flaws
 from taxel.wire import Registers
-from taxel.wire.registers import QUOTED_PRESETS
 
 __all__ = ["EmulateOptions"]
 
@@ -28,43 +27,59 @@ def _nothing(_: object) -> None:
 
 @dataclass(frozen=True)
 class EmulateOptions:
-    """Hold the options of `emulate`, which documents each, with their defaults."""
+    """Hold the options of `emulate`, which documents each: what the command line says of them, and their defaults.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of scenes, taxels and noise.
+    preset : str | None
+        The registers: one of `taxel.wire.PRESETS`. Default: the scene's, or those of the array at reset.
+    wire : Literal[1, 2] | None
+        Version of the wire. Default: the registers decide.
+    circuit : Circuit | None
+        Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, offset_mv, hysteresis_v,
+        settle_us, amplifier_us. One value is enough: the whole circuit is simulated, with the usual values for
+        the other names. The board then reaches about 2.4 kHz.
+    asynchronous : bool
+        Taxels send by themselves, without a scan, with stamps of 1 us (wire 2).
+    flaws : Flaws | None
+        A flaw of taxels and its size: gain (deviation of its logarithm), threshold, hysteresis and noise
+        (ticks), drift (ticks a minute), dead and stuck (share of taxels, 0 to 1), loose (lines). May be
+        repeated.
+    faults : Faults | None
+        A fault of the network: a share of the datagrams is lost, repeated, reordered, cut or corrupted. May be
+        repeated.
+    reset_every_s : float | None
+        Interval between resets of the board, s. Default: none.
+    drift_ppm : float
+        Error of the board's clock in parts per million; above 0, it runs too fast.
+    control : str | None
+        Accept commands on this TCP port, from this computer only; 0 finds a free one.
+    source_port : int
+        The UDP port to send from; 0: any.
+    """
 
     touch: Iterable[Act] | Replay
     _: KW_ONLY
-    seed: int = option(0, "Seed of scenes, taxels and noise.", least=0)
-    preset: str | None = option(
-        None, f"The registers: one of {QUOTED_PRESETS}. Default: the scene's, or those of the array at reset."
-    )
+    seed: int = option(0, least=0)
+    preset: str | None = option(None)
     registers: Registers | None = None
     tare_ms: float = 50.0
     array: Array | None = None
     sensor: Mapping[str, float] | None = None
-    wire: Literal[1, 2] | None = option(None, "Version of the wire. Default: the registers decide.", least=1, most=2)
+    wire: Literal[1, 2] | None = option(None, least=1, most=2)
     previous: Literal["last_sent", "last_sample"] = "last_sent"
     intensity: Literal["value", "difference", "nothing"] = "value"
     version_2: Version2 | None = None
-    circuit: Circuit | None = option(
-        None,
-        "Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, offset_mv, hysteresis_v, "
-        "settle_us, amplifier_us. One value is enough: the whole circuit is simulated, with the usual values for the "
-        "other names. The board then reaches about 2.4 kHz.",
-    )
-    asynchronous: bool = option(False, "Taxels send by themselves, without a scan, with stamps of 1 us (wire 2).")
-    flaws: Flaws | None = option(
-        None,
-        "A flaw of taxels and its size: gain (deviation of its logarithm), threshold, hysteresis and noise (ticks), "
-        "drift (ticks a minute), dead and stuck (share of taxels, 0 to 1), loose (lines). May be repeated.",
-    )
-    faults: Faults | None = option(
-        None,
-        "A fault of the network: a share of the datagrams is lost, repeated, reordered, cut or corrupted. "
-        "May be repeated.",
-    )
-    reset_every_s: float | None = option(None, "Interval between resets of the board, s. Default: none.", least=0.001)
-    drift_ppm: float = option(0.0, "Error of the board's clock in parts per million; above 0, it runs too fast.")
-    control: str | None = option(None, "Accept commands on this TCP port, from this computer only; 0 finds a free one.")
-    source_port: int = option(0, "The UDP port to send from; 0: any.", least=0, most=65_535)
+    circuit: Circuit | None = option(None)
+    asynchronous: bool = option(False)
+    flaws: Flaws | None = option(None)
+    faults: Faults | None = option(None)
+    reset_every_s: float | None = option(None, least=0.001)
+    drift_ppm: float = option(0.0)
+    control: str | None = option(None)
+    source_port: int = option(0, least=0, most=65_535)
     begun: Callable[[str | None], object] = _nothing
     watch: Callable[[EmulatorReport], object] = _nothing
     touched: Callable[[list[Contact]], object] = _nothing

@@ -74,7 +74,14 @@ impl Handle {
     /// The address on which another board of the recording is received; `None` if there is no such source.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
-        self.pipelines.iter().find(|(known, _)| known == name).map(|(_, shared)| shared.receiver.address())
+        self.of_source(name).map(|source| source.address())
+    }
+
+    /// A handle to another source of its recordings; `None` if there is no such source.
+    #[must_use]
+    pub fn of_source(&self, name: &str) -> Option<Self> {
+        let (_, shared) = self.pipelines.iter().find(|(known, _)| known == name)?;
+        Some(Self::new(Arc::clone(shared), Arc::default()))
     }
 
     /// Passes lines of a source of numbers on, as a reader or a program has them.

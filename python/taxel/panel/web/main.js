@@ -134,10 +134,12 @@ function showUnits() {
   numbering.number_us = frames?.number_us ?? null;
   numbering.begin_us = beginning(opened?.start_us ?? live?.begin_us ?? null);
   write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);
-  const trials = part("trials", HTMLSelectElement);
-  trials.hidden = !frames?.trials.length;
-  trials.replaceChildren(...(frames?.trials ?? []).map((name) => make("option", { value: name }, name)));
-  trials.value = frames?.trial ?? "";
+  const parts = part("parts", HTMLSelectElement);
+  const sensors = !opened && hello && hello.sources.length > 1 ? hello.sources : [];
+  const names = frames?.trials ?? sensors;
+  parts.hidden = !names.length;
+  parts.replaceChildren(...names.map((name) => make("option", { value: name }, name)));
+  parts.value = (opened ? frames?.trial : hello?.sensor) ?? "";
   showLanes();
 }
 
@@ -526,9 +528,10 @@ part("files", HTMLSelectElement).onchange = ({ target }) => {
   if (value) ask(value);
   else player.follow();
 };
-part("trials", HTMLSelectElement).onchange = ({ target }) => {
+part("parts", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
   if (opened) ask(opened.name, value);
+  else server.request({ type: "sensor", name: value }).catch(failed);
 };
 
 arrangeForWidth();

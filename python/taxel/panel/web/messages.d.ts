@@ -1,4 +1,4 @@
-// The messages of the server (taxel/panel) as the page reads them, and the keys of its requests, which taxel/panel/session.py declares and documents.
+// The messages of the server (taxel/panel) as the page reads them, and the keys of its requests, which taxel/panel/requests.py declares and documents.
 
 /** A sensor. */
 export interface ArrayInfo {
@@ -210,8 +210,10 @@ export interface Hello {
   lines: string | null;
   /** That source as a text states it, with all of its keys; null of a board. */
   source: string | null;
-  /** The names of the live sources: first the one that is shown and read out, then those that are only recorded; empty without a board. */
+  /** The names of the live sources: first the one that is read out, then those that are only recorded; empty without a board. */
   sources: string[];
+  /** The one of them that this client follows. */
+  sensor: string | null;
   /** The values of those frames, after the first one; null of a board, whose values are ticks. */
   frames: LiveFrames | null;
   /** The board's serial line; null: registers cannot be written. */
@@ -813,6 +815,12 @@ export interface ConnectRequest {
   text?: string | null;
 }
 
+export interface SensorRequest {
+  type: "sensor";
+  id?: number;
+  name: string;
+}
+
 export interface DisconnectRequest {
   type: "disconnect";
   id?: number;
@@ -883,4 +891,5 @@ export type Request =
   | PortsRequest
   | GuessRequest
   | ConnectRequest
+  | SensorRequest
   | DisconnectRequest;

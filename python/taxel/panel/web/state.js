@@ -88,7 +88,7 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
         : silent
           ? ["quiet", silent.word]
           : ["live", "Live"];
-  const cannotZero = source !== null || !hello?.live || state !== "following";
+  const cannotZero = source !== null || !hello?.live || hello.sensor !== hello.sources[0] || state !== "following";
   part("zero", HTMLButtonElement).hidden = cannotZero;
   part("zero-all", HTMLButtonElement).hidden = cannotZero;
   const pill = part("state", HTMLElement);
