@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple, Self
 
@@ -254,7 +254,7 @@ class Tuning:
         equal = [one for one in pair if one.fit.cost <= best.fit.cost + best.fit.room(labels)]
         return min(equal, key=lambda one: (_rank(one.rule), abs(one.fit.constant_ms)), default=best)
 
-    def _best_at(self, name: str, edge: int, windows: NDArray[np.int64], grid: Iterable[EdgeRule]) -> _Best:
+    def _best_at(self, name: str, edge: int, windows: NDArray[np.int64], grid: Sequence[EdgeRule]) -> _Best:
         """Return the best rule for a label at one edge of loads, in windows on the one clock."""
         labels = int(np.count_nonzero(within(self._truth[name], windows)))
         best = self._equal(self._fits(name, edge, windows, grid), labels)
