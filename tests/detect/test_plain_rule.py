@@ -10,7 +10,7 @@ from plain_rules import ARRAY, FLOOR, as_tuples, clocks, events, expected, in_pi
 
 import taxel
 from taxel import Array, Events, Frames
-from taxel.detect import Example, PlainRule, run, tune
+from taxel.detect import Example, PlainRule, run, score, tune
 
 
 @settings(deadline=None)
@@ -192,6 +192,29 @@ def test_tuning_finds_when_a_touch_leaves_the_place_where_it_began():
     for one in (rule, begin_area):
         score = taxel.detect.score(run(one, unseen.source, tare=unseen.tare), unseen.labels, 4)
         assert (score.missed, score.false) == (0, 0)
+
+
+def test_tuning_finds_what_happens_within_touches():
+    def slid(seed):
+        """Touches of 2 s, in which load moves from some taxels to others for 200 ms."""
+        draw, t = np.random.default_rng(seed), 10_000 * np.arange(4000)
+        values, slips = draw.normal(0.0, 1.0, (4000, 1, 6)), []
+        for begin in range(100, 3800, 400):
+            values[begin : begin + 200] += 60.0
+            slip = begin + int(draw.integers(50, 150))
+            values[slip : slip + 20, :, :3] += 30.0
+            values[slip : slip + 20, :, 3:] -= 30.0
+            slips.append(10_000 * slip)
+        frames = Frames(values, t, unit="N", array=Array(1, 6))
+        ends = np.column_stack([slips, np.add(slips, 200_000)])
+        return Example(frames, {"slip": slips}, taxel.Tare.take(frames, stop_us=900_000), spans={"slip": ends})
+
+    rule = tune([slid(1), slid(2)], noise_floor=6.0)["slip"]
+    assert rule.quantity == "moved"
+    assert rule.touched_ms is not None
+    unseen = slid(3)
+    found = run(rule, unseen.source, tare=unseen.tare)
+    assert score(found, unseen.labels, 20.0, unseen.spans).rank[0] == 0
 
 
 def test_tuning_says_none_where_no_rule_is_better_than_nothing():

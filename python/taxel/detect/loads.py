@@ -230,6 +230,12 @@ class Loads:
         times = np.concatenate(by_example)
         return FoundTimes(times, times, np.zeros(len(times))).between(self.windows(parts)).t
 
+    def spans(self, name: str) -> NDArray[np.int64]:
+        """Return begin and end, us on the one clock, of the labels of a name that have an end, shape (labels, 2)."""
+        none = np.empty((0, 2), np.int64)
+        each = zip(self._examples, self._shift, strict=True)
+        return np.concatenate([none, *(example.spans.get(name, none) + shift for example, shift in each)])
+
     def inside(self, name: str, away_us: int) -> int:
         """Return how many labels of a name lie within a load, so far from its begin and its end at least."""
         if not self.have_rest:

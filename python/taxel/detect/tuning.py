@@ -16,7 +16,7 @@ from taxel.detect import recipes
 from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks, within
 from taxel.detect.plain_rule import PlainRule
-from taxel.detect.scoring import APART_US, many, tally
+from taxel.detect.scoring import APART_US, in_spans, many, tally
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Levels of a quantity are so many quantiles of it where it is loaded, which tell weak loads apart, and so many
@@ -218,6 +218,7 @@ class Tuning:
         #: From how far off a detection is part of a mistake.
         self.off_ms = max(OFF * window_ms, loads.frame_ms)
         self._truth = {name: loads.truth(name, loads.whole_examples) for name in names}
+        self._spans = {name: loads.spans(name) for name in names}
         self._windows = loads.windows(loads.whole_examples)
         #: The names whose labels lie within touches, most of them.
         self.within = {name for name, true in self._truth.items() if 2 * loads.inside(name, self._width_us) > len(true)}
@@ -343,14 +344,18 @@ class Tuning:
                     for k, rule in enumerate(some)
                     if not (edge and rule.quantity in CHANGES) and (rule.touched_ms is None or name in self.within)
                 ]
-                outcomes = self._made([some[k] for k in fit], [each[k][edge] for k in fit], true)
+                outcomes = self._made([some[k] for k in fit], [each[k][edge] for k in fit], true, self._spans[name])
                 if outcomes is not None:
                     made.setdefault((name, edge), []).append(outcomes)
         for key, of_key in made.items():
             self._outcomes[key] = _Outcomes.joined([*filter(None, [self._outcomes.get(key)]), *of_key])
 
     def _made(
-        self, rules: Sequence[EdgeRule], found: Sequence[FoundTimes], true: NDArray[np.int64]
+        self,
+        rules: Sequence[EdgeRule],
+        found: Sequence[FoundTimes],
+        true: NDArray[np.int64],
+        spans: NDArray[np.int64],
     ) -> _Outcomes | None:
         """Return what rules make of labels by what each finds; None where none is better than to find nothing.
 
@@ -370,6 +375,7 @@ class Tuning:
             late_us = np.rint(to_us(np.where(is_within & np.isfinite(medians), medians, 0.0))).astype(np.int64)
             errors, delays, is_false = self._paired(t - late_us[of], known, of, len(sound), true)
             errors += to_ms(late_us)[:, None]
+        is_false &= ~in_spans(t, spans)
         wrong = np.isnan(errors).sum(axis=1) + np.bincount(of[is_false], minlength=len(sound))
         better = np.flatnonzero(wrong < len(true))
         place = np.full(len(sound), -1)
@@ -435,7 +441,7 @@ class Tuning:
             fits = {}
             for name, is_kind in ((below, areas < level), (above, areas >= level)):
                 of_kind = FoundTimes(t[is_kind], known[is_kind], areas[is_kind])
-                one = self._made([EdgeRule("area", level)], [of_kind], truth[name])
+                one = self._made([EdgeRule("area", level)], [of_kind], truth[name], self._spans[name])
                 fits[name] = _NONE
                 if one is not None:
                     [fits[name]] = self._of_rows(one.error_ms, one.delay_ms, np.array([len(one.false)]))
