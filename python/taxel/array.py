@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
@@ -233,6 +234,12 @@ class Array:
     def _has_neighbours(self) -> bool:
         """Whether taxels are known to be side by side: a single row or column without a pitch is channels."""
         return self.pitch_mm is not None or 1 not in self.shape or self.shape == (1, 1)
+
+    @property
+    def _has_axes(self) -> bool:
+        """Whether the channels are the axes of taxels: names end in _x, _y and _z, equally many in each."""
+        counts = Counter(name[-2:] for name in self.names or ())
+        return self.is_channels and set(counts) == {"_x", "_y", "_z"} and len(set(counts.values())) == 1
 
     def _padded(self, shape: tuple[int, int]) -> Array:
         """Return a larger grid, whose first rows and columns are this array."""

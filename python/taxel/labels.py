@@ -69,6 +69,8 @@ class Note:
         The source of the recording that the event belongs to, for example "left"; "" for all sources.
     replaces : int, us, optional
         Time of the recording's own note that a label replaces; the note then no longer counts.
+    lasts : int, us
+        How long what it labels lasts, by the columns `stop_us` or `duration` (s); 0 where that is not stated.
     others : tuple of (str, str)
         The columns of its table that taxel does not know, such as `comment`, and their texts.
 
@@ -84,6 +86,7 @@ class Note:
     recording: str = ""
     source: str = ""
     replaces: int | None = field(default=None, repr=False)
+    lasts: int = field(default=0, repr=False)
     others: tuple[tuple[str, str], ...] = field(default=(), repr=False)
 
 
@@ -208,13 +211,24 @@ class Labels:
         clock_of: Callable[[], Clock | None],
     ) -> dict[str, NDArray[np.int64]]:
         """Return the events of a source of the recording at this path; its begin and clock are read if needed."""
+        by_label: dict[str, list[int]] = {}
+        for row in self._of(path, source, trial, side, begin_us, clock_of):
+            by_label.setdefault(row.text, []).append(row.t or 0)
+        return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
+
+    def _of(
+        self,
+        path: Path,
+        source: str,
+        trial: str,
+        side: str,
+        begin_us: Callable[[], int],
+        clock_of: Callable[[], Clock | None],
+    ) -> list[Note]:
+        """Return the labels of a source of the recording at this path, by its clock."""
         rows = self._rows(path, source, trial, side, begin_us)
         clock = clock_of() if any(row.at_ns for row in rows) else None
-        by_label: dict[str, list[int]] = {}
-        for row in rows:
-            ahead = ahead_us(row, path, clock, self.path)
-            by_label.setdefault(row.text, []).append((row.t or 0) - ahead)
-        return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
+        return [replace(row, t=(row.t or 0) - ahead_us(row, path, clock, self.path)) for row in rows]
 
     def _rows(
         self,
@@ -435,4 +449,14 @@ def _row(location: str, line: int, cells: Mapping[str, str]) -> Note:
     source = values.get("source", "")
     named = values.get("recording", ""), source_of(source) if source.startswith("/") else source
     others = tuple((name, cell) for name, cell in cells.items() if name not in (*_WANTED, *_KNOWN))
-    return Note(values["label"], times["t_us"], times.get("host_ns", 0), *named, replaces, others)
+    lasts = _lasts(values, times["t_us"])
+    return Note(values["label"], times["t_us"], times.get("host_ns", 0), *named, replaces, lasts, others)
+
+
+def _lasts(values: Mapping[str, str], begin_us: int) -> int:
+    """Return how long a label lasts, us; 0 where no end is stated."""
+    try:
+        stop = float(values.get("stop_us") or begin_us + 1e6 * float(values.get("duration") or 0.0))
+    except ValueError:
+        return 0
+    return round(stop) - begin_us if begin_us < stop < np.inf else 0

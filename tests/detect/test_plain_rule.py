@@ -1,5 +1,7 @@
 """A plain rule against a loop over frames, written from its documentation; pieces, frames, files, live, tuning."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,7 @@ from plain_rules import ARRAY, FLOOR, as_tuples, clocks, events, expected, in_pi
 
 import taxel
 from taxel import Array, Events, Frames
-from taxel.detect import Example, PlainRule, run, tune
+from taxel.detect import Example, PlainRule, run, score, tune
 
 
 @settings(deadline=None)
@@ -106,6 +108,59 @@ def test_a_load_by_running_range_is_what_a_loop_over_frames_adds():
     assert len(whole) > 20
 
 
+# The shear of three axes
+
+
+def test_shear_is_what_a_loop_over_frames_adds():
+    draw = np.random.default_rng(9)
+    t = np.cumsum(draw.choice([9_000, 12_000, 13_000, 150_000], 300, p=[0.3, 0.4, 0.29, 0.01]))
+    names = [f"{taxel}_{axis}" for taxel in "abc" for axis in "xyz"]
+    array, rest = Array(1, 9, names=names), draw.normal(0.0, 2e4, 9)
+    values = np.float32(rest + np.cumsum(draw.normal(0.0, 40.0, (300, 9)), axis=0))
+    frames = Frames(values[:, None], t, array=array)
+    taken = taxel.Tare.take(Frames(np.float32([[rest], [rest]]), [0, 1000], array=array))
+    mean, before, rises, falls = None, None, [], []
+    for now, row in zip(t.tolist(), values.astype(np.float64) - taken.rest[0], strict=True):
+        shear = np.array([row[0::3].sum(), row[1::3].sum()])
+        if before is None:
+            smooth, mean = shear, shear
+        else:
+            mean = mean - math.expm1(-(now - before) / 1e5) * (smooth - mean)
+            smooth = smooth - math.expm1(-(now - before) / 2e4) * (shear - smooth)
+        before, change = now, math.dist(smooth, mean)
+        grows = math.hypot(*smooth) > math.hypot(*mean)
+        rises.append(change if grows else 0.0)
+        falls.append(0.0 if grows else change)
+    curves = taxel._core.LoadCurve.of_frames(["shear_rise", "shear_fall"], [], 0.0, frames, None, taken.to_json())
+    for curve, loop in zip(curves, (rises, falls), strict=True):
+        times, found = curve.changes()
+        held = found[np.searchsorted(times, t, side="right") - 1]
+        assert held == pytest.approx(loop, rel=1e-4, abs=0.05)
+    # What is touched, z says.
+    [load] = taxel._core.LoadCurve.of_frames(["load"], [], 0.0, frames, None, taken.to_json())
+    times, found = load.changes()
+    above = (values - taken.rest[0])[:, 2::3]
+    of_z = np.where(above > 0.5, above, 0.0).sum(axis=1)
+    assert found[np.searchsorted(times, t, side="right") - 1] == pytest.approx(of_z, rel=1e-4, abs=0.05)
+    with pytest.raises(taxel.ProblemError):
+        taxel._core.LoadCurve.of_frames(["shear_rise"], [], 0.0, press_frames(), None, tare().to_json())
+
+
+def press_frames():
+    return Frames(np.zeros((2, *ARRAY.shape)), [0, 1000], array=ARRAY)
+
+
+def test_the_rest_of_x_and_y_follows_while_z_is_at_rest_alone():
+    t, array = 10_000 * np.arange(1000), Array(1, 3, names=["a_x", "a_y", "a_z"])
+    values = np.zeros((1000, 1, 3), np.float32)
+    values[100:, 0, 0], values[:500, 0, 2] = 5.0, 50.0
+    taken = taxel.Tare.take(Frames(np.zeros((2, 1, 3)), [0, 1000], array=array))
+    left = taxel._core.follow_rest(Frames(values, t, array=array), taken.to_json(), 10.0, 60.0).reshape(1000, 3)
+    assert left[499].tolist() == [5.0, 0.0, 50.0]
+    # 63 % in a second, as of any taxel near its rest.
+    assert left[600, 0] == pytest.approx(5.0 * math.exp(-1.0), rel=0.02)
+
+
 # Tuning
 
 
@@ -143,6 +198,29 @@ def test_tuning_finds_when_a_touch_leaves_the_place_where_it_began():
     for one in (rule, begin_area):
         score = taxel.detect.score(run(one, unseen.source, tare=unseen.tare), unseen.labels, 4)
         assert (score.missed, score.false) == (0, 0)
+
+
+def test_tuning_finds_what_happens_within_touches():
+    def slid(seed):
+        """Touches of 2 s, in which load moves from some taxels to others for 200 ms."""
+        draw, t = np.random.default_rng(seed), 10_000 * np.arange(4000)
+        values, slips = draw.normal(0.0, 1.0, (4000, 1, 6)), []
+        for begin in range(100, 3800, 400):
+            values[begin : begin + 200] += 60.0
+            slip = begin + int(draw.integers(50, 150))
+            values[slip : slip + 20, :, :3] += 30.0
+            values[slip : slip + 20, :, 3:] -= 30.0
+            slips.append(10_000 * slip)
+        frames = Frames(values, t, unit="N", array=Array(1, 6))
+        ends = np.column_stack([slips, np.add(slips, 200_000)])
+        return Example(frames, {"slip": slips}, taxel.Tare.take(frames, stop_us=900_000), spans={"slip": ends})
+
+    rule = tune([slid(1), slid(2)], noise_floor=6.0)["slip"]
+    assert rule.quantity == "moved"
+    assert rule.touched_ms is not None
+    unseen = slid(3)
+    found = run(rule, unseen.source, tare=unseen.tare)
+    assert score(found, unseen.labels, 20.0, unseen.spans).rank[0] == 0
 
 
 def test_tuning_says_none_where_no_rule_is_better_than_nothing():

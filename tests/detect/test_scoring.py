@@ -121,3 +121,15 @@ def test_notes_are_a_truth_and_labels_that_it_lacks_are_left_out() -> None:
         assert (scored.found, scored.missed, scored.false, list(scored.by_label)) == (1, 1, 1, ["contact"])
     assert score(found, {"contact": [], "lift": []}).false == 3
     assert score(found["contact"], []).false == 2
+
+
+@given(TIMES, TIMES, st.lists(st.integers(1, 10**5), min_size=12, max_size=12))
+def test_what_is_detected_again_within_an_event_that_lasts_is_not_false(found, truth, lasts) -> None:
+    detections, events = taxel.Detections(["e"] * len(found), sorted(found), sorted(found)), sorted(truth)
+    spans = [[t, t + by] for t, by in zip(events, lasts, strict=False)]
+    plain, with_ends = (score(detections, {"e": events}, 20.0, **how) for how in ({}, {"spans": {"e": spans}}))
+    false = [t for t in detections.t[plain.false_detections] if not any(a <= t < b for a, b in spans)]
+    assert detections.t[with_ends.false_detections].tolist() == false
+    assert with_ends.again == plain.false - len(false)
+    assert with_ends.false_near == sum(any(abs(t - e) <= 20_000 for e in events) for t in false)
+    assert (with_ends.found, with_ends.missed) == (plain.found, plain.missed)

@@ -136,10 +136,12 @@ def test_numbered_groups_are_trials(above: str, tmp_path: Path) -> None:
 def test_three_axes_at_the_end_are_asked(tmp_path: Path) -> None:
     numbers = np.random.default_rng(1).random((50, 4, 5, 3)).astype(np.float32)
     np.savez(tmp_path / "a.npz", skin=numbers, t_ms=np.arange(50) * 10)
-    z, all_axes, shear = layouts(tmp_path / "a.npz")
+    z, all_axes, shear, xyz = layouts(tmp_path / "a.npz")
     np.testing.assert_array_equal(values(opened(tmp_path / "a.npz", z)), numbers[..., 2])
     np.testing.assert_array_equal(values(opened(tmp_path / "a.npz", all_axes), "y"), numbers[..., 1])
     np.testing.assert_allclose(values(opened(tmp_path / "a.npz", shear)), np.hypot(numbers[..., 0], numbers[..., 1]))
+    one = opened(tmp_path / "a.npz", xyz)
+    np.testing.assert_array_equal(values(one), numbers.reshape(50, 1, 60))
 
 
 def test_several_arrays_are_named_with_their_shapes(tmp_path: Path) -> None:

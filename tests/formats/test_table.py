@@ -24,6 +24,7 @@ from taxel.formats.table import read_table
 from .tables import frames, layouts, opened, opened_by
 
 JSON_AXES = '{"ts": 0.1, "left": [[1, 2, 30], [4, 5, 60]]}\n{"ts": 0.2, "left": [[1, 2, 31], [4, 5, 61]]}\n'
+AXIS_LAYOUTS = ['axis = "z"', 'axis = "all"', 'axis = "shear"', 'axis = "xyz"']
 SIDES = (
     "x\n,L::heel,L,,R::heel,R,,\nTime[secs],Force[N],Force[N],Time[secs],Force[N],Force[N],\n"
     "0.0,1,1,0.0,2,2,,\n0.1,1,1,0.1,-1,-,,\n"
@@ -262,8 +263,8 @@ def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, tex
         ("01 10 20\n02 11 21\n", ["", 'lines = "hex"']),
         ("0,0,left,1,2\n5,1,right,8,9\n10,0,left,1,2\n", ["by = 3", "leave_out = [2, 3]"]),
         ("t_ms,hand,a\n0,1,5\n10,2,7\n20,1,5\n", ['by = "hand"', 'leave_out = ["hand"]']),
-        ("t,l0_x,l0_y,l0_z,l1_x,l1_y,l1_z\n0,1,2,30,4,5,60\n", ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
-        (JSON_AXES, ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
+        ("t,l0_x,l0_y,l0_z,l1_x,l1_y,l1_z\n0,1,2,30,4,5,60\n", AXIS_LAYOUTS),
+        (JSON_AXES, AXIS_LAYOUTS),
         ("t_ms;a;b\n0;0,5;0.513\n10;0,6;0.5\n", ['leave_out = ["a"]']),
         ("t_ms,a,b\n" + "".join(f"{k},{k % 3},{k % 20} # ok\n" for k in range(30)), ['leave_out = ["b"]']),
         ("time,a\n0:10,1\n0:20,2\n0:30,1\n", ['time_unit = "iso"']),
@@ -301,6 +302,7 @@ def test_rows_of_one_frame_are_asked(tmp_path: Path) -> None:
 
 
 AXES = {"x": [[1, 4]], "y": [[2, 5]], "z": [[30, 60]], "shear": [[np.hypot(1, 2), np.hypot(4, 5)]]}
+AXES |= {"xyz": [[1, 2, 30, 4, 5, 60]]}
 
 
 @pytest.mark.parametrize("axis", [*AXES, "all"])
@@ -310,7 +312,8 @@ def test_one_axis_of_taxels_with_three_or_each_as_a_source(tmp_path: Path, axis:
     assert list(found.sources) == (["x", "y", "z"] if axis == "all" else [""])
     for name in found.sources:
         np.testing.assert_allclose(frames(found, name)[1], AXES[name or axis])
-        assert found.sources[name].array.names == ("l0", "l1")
+        names = found.sources[name].array.names
+        assert names == (("l0_x", "l0_y", "l0_z", "l1_x", "l1_y", "l1_z") if axis == "xyz" else ("l0", "l1"))
 
 
 def test_columns_of_a_pattern_are_kept(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from touching import pressed
 
 import taxel
 from taxel.detect import PlainRule
+from taxel.tasks.labels import spans
 
 
 @pytest.fixture
@@ -70,3 +71,21 @@ def test_ends_that_a_rule_finds_are_not_said_to_lie_within_touches(tmp_path: Pat
         training = taxel.train(taxel.open(tmp_path / "a.npz"), [given], taxel.tasks.TrainOptions(folds=0))
         assert sum("lie within touches" in line for line in training.warnings) == lines
         assert training.command("foot.json") == "taxel detect RECORDING --readout foot.json"
+
+
+def test_a_label_may_have_an_end(tmp_path: Path) -> None:
+    made = taxel.Frames(np.zeros((300, 1, 2)), 10_000 * np.arange(300), unit="counts", array=taxel.Array(1, 2))
+    place = tmp_path / "a.npz"
+    taxel.convert(made, place)
+    opened = [taxel.open(place)]
+    tables = {
+        "us.csv": "label,t_us,stop_us\nslip,100000,300000\nlift,500000,\nslip,900000,1000000\n",
+        "bids.tsv": "onset\tduration\ttrial_type\n0.1\t0.2\tslip\n0.5\t0\tlift\n0.9\t0.1\tslip\n",
+        "track.txt": "0.1\t0.3\tslip\n0.5\t0.5\tlift\n0.9\t1.0\tslip\n",
+    }
+    for name, text in tables.items():
+        (tmp_path / name).write_text(text)
+        [found] = spans(tmp_path / name, opened, shift_ms=1.0)
+        assert {label: each.tolist() for label, each in found.items()} == {
+            "slip": [[101_000, 301_000], [901_000, 1_001_000]]
+        }

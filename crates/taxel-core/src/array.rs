@@ -212,6 +212,16 @@ impl Array {
         }
     }
 
+    /// The axis of each channel, 0 to 2, where the channels are the axes of taxels, as names that end in _x, _y and _z say,
+    /// equally many of each; else empty.
+    #[must_use]
+    pub fn axes(&self) -> Vec<usize> {
+        let axis_of = |name: &String| ["_x", "_y", "_z"].iter().position(|axis| name.ends_with(axis));
+        let axes: Vec<_> = self.names.iter().flatten().map_while(axis_of).collect();
+        let is_third = |axis| 3 * axes.iter().filter(|&&of| of == axis).count() == self.len();
+        if self.is_channels() && (0..3).all(is_third) { axes } else { vec![] }
+    }
+
     /// Whether it is a single row or column with neither pitch nor places, which has no map, centre or area.
     #[must_use]
     pub fn is_channels(&self) -> bool {

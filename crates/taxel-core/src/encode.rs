@@ -22,6 +22,7 @@ mod range_load;
 mod recent;
 mod receptor;
 mod running_range;
+mod shear;
 mod side_by_side;
 mod slowly_adapting;
 mod stream;

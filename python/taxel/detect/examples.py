@@ -7,6 +7,7 @@ classifier tells from others.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from taxel._base.errors import refused
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.scoring import Score
+from taxel.detect.scoring import Score, spans_of
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
@@ -52,6 +53,8 @@ class Example(NamedTuple):
     held_with : str
         Examples of one value, as the person, object or sensor that they are of, share a fold, where `group` is part of
         one; "": their groups alone.
+    spans : mapping of str to int, shape (events, 2), us
+        Begin and end of the labels that have an end: what is detected again before the end is not false.
 
     Raises
     ------
@@ -71,6 +74,7 @@ class Example(NamedTuple):
     name: str = ""
     labels_of: str = ""
     held_with: str = ""
+    spans: Mapping[str, Any] = MappingProxyType({})
 
 
 def name_of(k: int, example: Example) -> str:
@@ -120,7 +124,7 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        is_example = isinstance(example, tuple) and len(example) in range(2, 8)
+        is_example = isinstance(example, tuple) and len(example) in range(2, 9)
         source = recorded(example[0]) if is_example else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
@@ -128,9 +132,9 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
                 "and labels"
             )
         _, labels, *rest = example
-        optional: list[Any] = [None, "", "", "", ""]
+        optional: list[Any] = [None, "", "", "", "", {}]
         optional[: len(rest)] = rest
-        tare, group, name, labels_of, held_with = optional
+        tare, group, name, labels_of, held_with, spans = optional
         name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
             raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
@@ -138,7 +142,8 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         tare = None if tare is None else instance(f"{name}: tare", tare, Tare)
         group, labels_of = text(f"{name}: group", group), text(f"{name}: labels_of", labels_of)
         held_with = text(f"{name}: held_with", held_with)
-        sound.append(Example(source, times, tare, group, name, labels_of, held_with))
+        ends = spans_of(f"{name}: spans", spans)
+        sound.append(Example(source, times, tare, group, name, labels_of, held_with, ends))
     return _padded(sound)
 
 

@@ -386,7 +386,7 @@ class Fitter:
         """Return the score of detections in parts of the examples, as one."""
         each = {label: self.labels_in(label, parts) for label in self.labels}
         truths = [{label: times[n] for label, times in each.items()} for n in range(len(parts))]
-        return score_together(found, truths, self.window_ms)
+        return score_together(found, truths, self.window_ms, [self.examples[part.example].spans for part in parts])
 
     def _received(self, point: Mapping[str, Any]) -> _Received:
         """Return what a neuron with these parameters receives of all examples."""

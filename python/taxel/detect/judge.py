@@ -83,6 +83,8 @@ class Judged:
         score of each fold is of what was better inside its training data.
     choices : mapping of str to Choice
         How the neuron and the rule of each label that has a rule compare in all folds.
+    found : tuple of Detections
+        What is scored, one an example that was tested.
     """
 
     scores: tuple[Score, ...]
@@ -94,6 +96,7 @@ class Judged:
     mistakes: tuple[Mistake, ...] = ()
     by_rule: tuple[str, ...] = ()
     choices: Mapping[str, Choice] = field(default_factory=dict)
+    found: tuple[Detections, ...] = ()
 
 
 def judge(
@@ -199,11 +202,13 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
     with_rules = [label for label in fitter.labels if tuned[label] is not None]
     choices = chosen(with_rules, fitter.off_ms, *(fitter.scores(each(way), parts) for way in ways))
     better = tuple(label for label, choice in choices.items() if choice.by_rule)
-    joined, truths = _by_example(fitter, parts, run)
-    scores = tuple(score(*compared, fitter.window_ms) for compared in zip(joined, truths, strict=True))
-    together = score_together(joined, truths, fitter.window_ms)
+    joined, truths, spans = _by_example(fitter, parts, run)
+    scores = tuple(
+        score(one, truth, fitter.window_ms, ends) for one, truth, ends in zip(joined, truths, spans, strict=True)
+    )
+    together = score_together(joined, truths, fitter.window_ms, spans)
     mistakes = mistakes_of(joined, truths, scores)
-    return Judged(scores, together, "", tuple(trained), neurons, plain, mistakes, better, choices)
+    return Judged(scores, together, "", tuple(trained), neurons, plain, mistakes, better, choices, tuple(joined))
 
 
 def _run(found: Found, by_rule: Sequence[str]) -> Detections:
@@ -218,8 +223,8 @@ def _run(found: Found, by_rule: Sequence[str]) -> Detections:
 
 def _by_example(
     fitter: Fitter, parts: Sequence[Part], found: Iterable[Detections]
-) -> tuple[list[Detections], list[dict[str, Any]]]:
-    """Return detections, and the labels in the parts that were tested, of each example."""
+) -> tuple[list[Detections], list[dict[str, Any]], list[Mapping[str, Any]]]:
+    """Return detections, the labels in the parts that were tested, and their spans, of each example."""
     of_example: dict[int, list[tuple[Part, Detections]]] = {}
     for part, one in zip(parts, found, strict=True):
         of_example.setdefault(part.example, []).append((part, one))
@@ -228,7 +233,7 @@ def _by_example(
         tested, detections = zip(*of_example[example], strict=True)
         joined.append(reduce(add, detections))
         truths.append({label: np.sort(np.concatenate(fitter.labels_in(label, tested))) for label in fitter.labels})
-    return joined, truths
+    return joined, truths, [fitter.examples[example].spans for example in sorted(of_example)]
 
 
 def _plain(rules: Rules) -> dict[str, Any]:

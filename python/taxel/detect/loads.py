@@ -22,9 +22,14 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
 #: The quantities that are changes of a load: each begins where a load begins, ends, or moves.
-CHANGES = ("rise", "fall", "moved", "local_rise", "local_fall")
+CHANGES = ("rise", "fall", "moved", "shear_rise", "shear_fall", "local_rise", "local_fall")
 #: Quantities that are measured together.
-_TOGETHER = (("load_without_largest", "load"), ("rise", "fall", "moved"), ("local_load", "local_rise", "local_fall"))
+_TOGETHER = (
+    ("load_without_largest", "load"),
+    ("rise", "fall", "moved"),
+    ("shear_rise", "shear_fall"),
+    ("local_load", "local_rise", "local_fall"),
+)
 #: Of an example so many frames at least are read for the levels of counts, if it has them; at most twice as many.
 _READ_FRAMES = 5000
 
@@ -110,6 +115,11 @@ class Loads:
     def are_channels(self) -> bool:
         """Whether taxels have no known neighbours."""
         return lacks_neighbours(self._examples)
+
+    @property
+    def have_axes(self) -> bool:
+        """Whether channels are the axes of taxels with three."""
+        return all(example.source.array._has_axes for example in self._examples)  # type: ignore[union-attr]
 
     @property
     def of_touches(self) -> EdgeRule:
@@ -219,6 +229,12 @@ class Loads:
         by_example = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
         times = np.concatenate(by_example)
         return FoundTimes(times, times, np.zeros(len(times))).between(self.windows(parts)).t
+
+    def spans(self, name: str) -> NDArray[np.int64]:
+        """Return begin and end, us on the one clock, of the labels of a name that have an end, shape (labels, 2)."""
+        none = np.empty((0, 2), np.int64)
+        each = zip(self._examples, self._shift, strict=True)
+        return np.concatenate([none, *(example.spans.get(name, none) + shift for example, shift in each)])
 
     def inside(self, name: str, away_us: int) -> int:
         """Return how many labels of a name lie within a load, so far from its begin and its end at least."""

@@ -35,7 +35,7 @@ class PlainRule(_Detector):
     Parameters
     ----------
     quantity : {"load", "load_without_largest", "range_load", "count", "area", "begin_area", "moved", "rise", "fall", \
-"local_load", "local_rise", "local_fall", "duration"}
+"shear_rise", "shear_fall", "local_load", "local_rise", "local_fall", "duration"}
         The sum of what taxels read above rest, in the sensor's unit, each loaded alone above the noise floor and six
         times its noise; that without the largest of them, which may be a bad taxel; the sum of what channels read in
         parts of their running ranges (`taxel.encode.RunningRange`), which needs no rest; how many taxels are above a
@@ -43,10 +43,13 @@ class PlainRule(_Detector):
         `taxel.encode.ContactArea` counts them; how many of these have been loaded since a touch began, or since less
         than a level after it, added up over `levels` in ms: none once it has left the place where it began, as that of
         a foot whose heel lifts; the smaller of what all taxels gain and what they lose against their running means of
-        100 ms, as an object that slides; how much the sum of all is above or below its running mean of 100 ms; the
-        largest sum over 3 x 3 taxels above a rest that follows the sensor, in units of its noise, as of
+        100 ms, as an object that slides; how much the sum of all is above or below its running mean of 100 ms; by how
+        much the shear, the sum as a vector of channels whose names end in _x and _y, smoothed over 20 ms, differs from
+        its running mean of 100 ms, while it is longer ("shear_rise") or shorter ("shear_fall") than that; the largest
+        sum over 3 x 3 taxels above a rest that follows the sensor, in units of its noise, as of
         `taxel.encode.LocalLoad`, or above ("local_rise") or below ("local_fall") their running means of 50 ms; or how
-        long a touch lasts, with the age "end". In single precision.
+        long a touch lasts, with the age "end". In single precision. Of channels that are axes of taxels, as their names
+        say, all but the shear are those of z.
     level : float, above 0
         The sensor's unit, parts of ranges, number of taxels, units of noise, or ms.
     release : float, above 0, at most 1
@@ -245,7 +248,8 @@ class PlainRule(_Detector):
     @property
     def _named_quantity(self) -> str:
         """The quantity, with the unit of its level where that is not a number of taxels."""
-        units = dict.fromkeys(("load", "load_without_largest", "moved", "rise", "fall"), self.unit)
+        sums = ("load", "load_without_largest", "moved", "rise", "fall", "shear_rise", "shear_fall")
+        units = dict.fromkeys(sums, self.unit)
         units |= dict.fromkeys(("local_load", "local_rise", "local_fall"), "units of noise")
         units |= {"range_load": "parts of ranges", "duration": "ms"}
         unit, name = units.get(self.quantity), self.quantity.replace("_", " ")

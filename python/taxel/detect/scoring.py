@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from operator import add
 from typing import Any, NamedTuple, cast
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import column, finite_numbers, instance, numbers, shown
+from taxel._base.arguments import column, finite_numbers, instance, mapping, numbers, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, plain, three_digits
 from taxel._core import ProblemError
@@ -97,6 +97,8 @@ class Score:
         `t` minus reference (negative is early) and `known` minus reference.
     by_label : dict of str to Score
         Empty in the score of one label.
+    again : int, 0 or more
+        How many further detections are within a label that has an end: they are not false.
     """
 
     label: str
@@ -107,6 +109,7 @@ class Score:
     errors_ms: NDArray[np.float64]
     delays_ms: NDArray[np.float64]
     by_label: Mapping[str, Score] = field(default_factory=dict)
+    again: int = 0
 
     @property
     def events(self) -> int:
@@ -155,7 +158,7 @@ class Score:
     def to_dict(self) -> dict[str, Any]:
         """Return counts and spreads (ms) as plain values, label by label; what is not known is None."""
         plain: dict[str, Any] = {
-            name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near")
+            name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near", "again")
         }
         for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay)):
             plain[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
@@ -206,6 +209,7 @@ def score(
     found: Detections,
     truth: Mapping[str, ArrayLike] | ArrayLike | Sequence[Note],
     window_ms: float | Mapping[str, float | ArrayLike] | ArrayLike = 50.0,
+    spans: Mapping[str, ArrayLike] | None = None,
 ) -> Score:
     """Score detections against reference events, label by label; those of labels that the truth lacks are left out.
 
@@ -220,6 +224,8 @@ def score(
         label that `found` has.
     window_ms : float, ms; or shape (events,), one a reference event; or a mapping of str to either
         How far a detection may be from its event, either way, 0 to 3 600 000; a mapping is by label. 50 as in 6.5.
+    spans : mapping of str to int, shape (events, 2), us, optional
+        Begin and end of events that last: what is detected again within one is not false.
 
     Returns
     -------
@@ -253,12 +259,45 @@ def score(
     for tally in (tally for tally in tallies if tally.label in known):
         pairs, lost = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
         scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, tally.errors_ms, tally.delays_ms)
+    for label, each in spans_of("spans", {} if spans is None else spans).items():
+        if label in scores:
+            scores[label] = _without_again(scores[label], found.t, times, windows, each)
     no_times, ms = np.empty(0, np.int64), np.empty(0)
     parts = [Score("all", np.empty((0, 2), np.int64), no_times, no_times, 0, ms, ms), *scores.values()]
     names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms")
     together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in parts]) for name in names}
     near = sum(score.false_near for score in parts)
-    return Score(parts[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
+    again = sum(score.again for score in parts)
+    name = parts[-1].label if len(scores) == 1 else "all"
+    return Score(name, false_near=near, by_label=scores, again=again, **together)
+
+
+def _without_again(
+    scored: Score, t: NDArray[np.int64], times: NDArray[np.int64], windows: NDArray[np.int64], spans: NDArray[np.int64]
+) -> Score:
+    """Return the score of a label without the false detections within events that last, which are counted as again."""
+    is_false = ~in_spans(t[scored.false_detections], spans)
+    false = scored.false_detections[is_false]
+    events = np.concatenate([scored.pairs[:, 1], scored.missed_events])
+    near = np.abs(t[false][:, None] - times[events]) <= windows[events]
+    again = int(np.count_nonzero(~is_false))
+    return replace(scored, false_detections=false, false_near=int(near.any(axis=1).sum()), again=again)
+
+
+def spans_of(name: str, spans: object) -> dict[str, NDArray[np.int64]]:
+    """Return begins and ends by label, each of shape (events, 2), us; refuse anything else."""
+    each = {label: numbers(f"{name}[{label!r}]", of, np.int64) for label, of in mapping(name, spans).items()}
+    for label, of in each.items():
+        if of.size and (of.ndim != 2 or of.shape[1] != 2):
+            raise refused(name, f"[{label!r}] has shape {of.shape}: must be (events, 2), begin and end of each")
+    return each
+
+
+def in_spans(t: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which times are within spans of begin and end, of shape (spans, 2)."""
+    begun, ended = (np.searchsorted(np.sort(edge), t, side="right") for edge in spans.reshape(-1, 2).T)
+    inside: NDArray[np.bool_] = begun > ended
+    return inside
 
 
 class Tally(NamedTuple):
@@ -296,18 +335,24 @@ def mistakes_of(
 
 
 def score_together(
-    detections: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], window_ms: float
+    detections: Sequence[Detections],
+    truths: Sequence[Mapping[str, NDArray[np.int64]]],
+    window_ms: float,
+    spans: Sequence[Mapping[str, NDArray[np.int64]]] = (),
 ) -> Score:
     """Score the detections in several recordings as one, with the events of each by the same labels (us)."""
     later = range(0, len(detections) * APART_US, APART_US)
     moved = [
         Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(detections, later, strict=True)
     ]
-    happened = {
-        label: np.concatenate([truth[label] + by for truth, by in zip(truths, later, strict=True) if label in truth])
-        for label in dict.fromkeys(label for truth in truths for label in truth)
-    }
-    return score(reduce(add, moved), happened, window_ms)
+
+    def on_one_clock(each: Sequence[Mapping[str, NDArray[np.int64]]]) -> dict[str, NDArray[np.int64]]:
+        return {
+            label: np.concatenate([one[label] + by for one, by in zip(each, later, strict=True) if label in one])
+            for label in dict.fromkeys(label for one in each for label in one)
+        }
+
+    return score(reduce(add, moved), on_one_clock(truths), window_ms, on_one_clock(spans) if spans else None)
 
 
 def _truth(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple, Self
 
@@ -16,8 +16,8 @@ from taxel.detect import recipes
 from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks, within
 from taxel.detect.plain_rule import PlainRule
-from taxel.detect.scoring import APART_US, many, tally
-from taxel.spikes import SpikeTrains, to_us
+from taxel.detect.scoring import APART_US, in_spans, many, tally
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Levels of a quantity are so many quantiles of it where it is loaded, which tell weak loads apart, and so many
 #: geometric steps from its noise to its largest value, which short events reach.
@@ -31,10 +31,9 @@ QUIETS_MS = (0.0, 50.0)
 #: So many levels of a count are geometric steps from the noise floor, or of channels from that part of it, to this
 #: quantile of what loaded taxels read.
 LEVELS, LEAST_SHARE, MOST = 8, 0.1, 0.5
-#: A touch has settled after so long, ms. It was chosen on the recordings that `taxel bench grip` learns from.
-SETTLING_MS = 200.0
-#: For how long what happens within a touch is below the release, ms.
-QUIETS_WITHIN_MS = (0.0, 50.0, 200.0)
+#: A touch has settled after so long, ms; what happens within it is over once it is below these parts of its level, for
+#: so long, ms: chosen on the recordings that `taxel bench grip` learns from.
+SETTLING_MS, RELEASES_WITHIN, QUIETS_WITHIN_MS = 300.0, (0.25, 0.5), (0.0, 50.0, 200.0, 500.0)
 #: Without its largest taxel the load of so many taxels is tried.
 SPARE = 8
 #: Levels of the area where a touch began, ms, each alone.
@@ -110,7 +109,8 @@ def tune(
     the root of the number of those that are wrong or off. Of equal ones counts first the load without its largest
     taxel, then a load or a count, then any other, where three levels are equal; of these the least `known`, to a
     fifth of the window, the fewest mistakes, to .2 % of the labels, and the level in the lower quarter of those that do
-    as well with the same other numbers. None is known later than the window, at the median.
+    as well with the same other numbers. None is known later than the window, at the median,
+    or within a touch later than that after what was felt.
 
     Tried are quantities of a load (`PlainRule`), each at levels that are quantiles and geometric steps of its values
     (`QUANTILES`, `STEPS`) on a ladder (`LADDER`), which end at parts of these (`RELEASES`) after a quiet time
@@ -218,9 +218,10 @@ class Tuning:
         #: From how far off a detection is part of a mistake.
         self.off_ms = max(OFF * window_ms, loads.frame_ms)
         self._truth = {name: loads.truth(name, loads.whole_examples) for name in names}
+        self._spans = {name: loads.spans(name) for name in names}
         self._windows = loads.windows(loads.whole_examples)
-        #: Whether labels of one name lie within touches, most of them.
-        self._within = any(2 * loads.inside(name, self._width_us) > len(true) for name, true in self._truth.items())
+        #: The names whose labels lie within touches, most of them.
+        self.within = {name for name, true in self._truth.items() if 2 * loads.inside(name, self._width_us) > len(true)}
         self._tried: set[EdgeRule] = set()
         #: Of a label at the begins and at the ends of loads.
         self._outcomes: dict[tuple[str, int], _Outcomes] = {}
@@ -232,7 +233,7 @@ class Tuning:
         """
         windows = self.loads.windows(parts)
         truth = {name: self.loads.truth(name, parts) for name in self._names}
-        grid = [*_grid(self.loads, parts, only), *(_within_touches(self.loads, parts) if self._within else ())]
+        grid = [*_grid(self.loads, parts, only), *(_within_touches(self.loads, parts) if self.within else ())]
         edges = {name: tuple(self._best_at(name, edge, windows, grid) for edge in (0, 1)) for name in self._names}
         onsets = [name for name, pair in edges.items() if _is_onset(*pair)]
         single = {name: self._better(pair, len(truth[name])) for name, pair in edges.items()}
@@ -254,12 +255,10 @@ class Tuning:
         equal = [one for one in pair if one.fit.cost <= best.fit.cost + best.fit.room(labels)]
         return min(equal, key=lambda one: (_rank(one.rule), abs(one.fit.constant_ms)), default=best)
 
-    def _best_at(self, name: str, edge: int, windows: NDArray[np.int64], grid: Iterable[EdgeRule]) -> _Best:
+    def _best_at(self, name: str, edge: int, windows: NDArray[np.int64], grid: Sequence[EdgeRule]) -> _Best:
         """Return the best rule for a label at one edge of loads, in windows on the one clock."""
         labels = int(np.count_nonzero(within(self._truth[name], windows)))
-        # A change of the load begins where the load begins or ends; it ends as it is forgotten.
-        possible = [rule for rule in grid if edge == 0 or rule.quantity not in CHANGES]
-        best = self._equal(self._fits(name, edge, windows, possible), labels)
+        best = self._equal(self._fits(name, edge, windows, grid), labels)
         if best is None:
             return _Best(_NONE, None)
         rule, fit = best
@@ -287,8 +286,11 @@ class Tuning:
             if least[rows[0]] > most:
                 break
             for row, fit in zip(rows.tolist(), self._of_rows(errors[rows], delays[rows], false[rows]), strict=True):
-                if fit.delay_ms <= self._window_ms + self.loads.frame_ms:
-                    fits.append((outcomes.rules[tried[row]], fit))
+                rule = outcomes.rules[tried[row]]
+                # What happens within a touch is felt later than its label.
+                felt_ms = max(fit.constant_ms, 0.0) if rule.touched_ms is not None else 0.0
+                if fit.delay_ms - felt_ms <= self._window_ms + self.loads.frame_ms:
+                    fits.append((rule, fit))
                     most = min(most, fit.cost + fit.room(errors.shape[1]))
         return fits
 
@@ -336,14 +338,24 @@ class Tuning:
             some = rules[k : k + _ROWS]
             each = [[edges.between(self._windows) for edges in self.loads.edges(rule)] for rule in some]
             for edge, (name, true) in product((0, 1), self._truth.items()):
-                outcomes = self._made(some, [pair[edge] for pair in each], true)
+                # A change of the load begins where the load begins or ends; it ends as it is forgotten.
+                fit = [
+                    k
+                    for k, rule in enumerate(some)
+                    if not (edge and rule.quantity in CHANGES) and (rule.touched_ms is None or name in self.within)
+                ]
+                outcomes = self._made([some[k] for k in fit], [each[k][edge] for k in fit], true, self._spans[name])
                 if outcomes is not None:
                     made.setdefault((name, edge), []).append(outcomes)
         for key, of_key in made.items():
             self._outcomes[key] = _Outcomes.joined([*filter(None, [self._outcomes.get(key)]), *of_key])
 
     def _made(
-        self, rules: Sequence[EdgeRule], found: Sequence[FoundTimes], true: NDArray[np.int64]
+        self,
+        rules: Sequence[EdgeRule],
+        found: Sequence[FoundTimes],
+        true: NDArray[np.int64],
+        spans: NDArray[np.int64],
     ) -> _Outcomes | None:
         """Return what rules make of labels by what each finds; None where none is better than to find nothing.
 
@@ -355,14 +367,15 @@ class Tuning:
             return None
         of = np.repeat(np.arange(len(sound)), [len(found[k].t) for k in sound])
         t, known = (np.concatenate([getattr(found[k], name) for k in sound]) for name in ("t", "known"))
-        begins = np.arange(len(sound)) * (len(self.loads.whole_examples) + 1) * APART_US
-        pairs = tally(t + begins[of], known + begins[of], (true + begins[:, None]).ravel(), self._width_us)
-        assert pairs is not None
-        is_false = np.ones(len(t), np.bool_)
-        is_false[pairs.detected] = False
-        errors, delays = np.full((2, len(sound) * len(true)), np.nan, np.float32)
-        errors[pairs.events], delays[pairs.events] = pairs.errors_ms, pairs.delays_ms
-        errors, delays = errors.reshape(len(sound), -1), delays.reshape(len(sound), -1)
+        errors, delays, is_false = self._paired(t, known, of, len(sound), true)
+        is_within = np.array([rules[k].touched_ms is not None for k in sound])
+        if is_within.any():
+            # Of what happens within touches the window is around the median distance from the labels.
+            medians = _medians(errors)
+            late_us = np.rint(to_us(np.where(is_within & np.isfinite(medians), medians, 0.0))).astype(np.int64)
+            errors, delays, is_false = self._paired(t - late_us[of], known, of, len(sound), true)
+            errors += to_ms(late_us)[:, None]
+        is_false &= ~in_spans(t, spans)
         wrong = np.isnan(errors).sum(axis=1) + np.bincount(of[is_false], minlength=len(sound))
         better = np.flatnonzero(wrong < len(true))
         place = np.full(len(sound), -1)
@@ -370,6 +383,19 @@ class Tuning:
         is_false &= place[of] >= 0
         kept = [rules[sound[row]] for row in better]
         return _Outcomes(kept, errors[better], delays[better], t[is_false], place[of[is_false]]) if kept else None
+
+    def _paired(
+        self, t: NDArray[np.int64], known: NDArray[np.int64], of: NDArray[np.int64], rows: int, true: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+        """Return how far detections and `known` of several rules are from each label, and which are false."""
+        begins = np.arange(rows) * (len(self.loads.whole_examples) + 1) * APART_US
+        pairs = tally(t + begins[of], known + begins[of], (true + begins[:, None]).ravel(), self._width_us)
+        assert pairs is not None
+        is_false = np.ones(len(t), np.bool_)
+        is_false[pairs.detected] = False
+        errors, delays = np.full((2, rows * len(true)), np.nan, np.float32)
+        errors[pairs.events], delays[pairs.events] = pairs.errors_ms, pairs.delays_ms
+        return errors.reshape(rows, -1), delays.reshape(rows, -1), is_false
 
     def detected(self, rule: PlainRule | None, label: str, part: Stretch) -> FoundTimes:
         """Return what the rule of a label detects of it in a part of an example, as `taxel.detect.run` finds it."""
@@ -415,7 +441,7 @@ class Tuning:
             fits = {}
             for name, is_kind in ((below, areas < level), (above, areas >= level)):
                 of_kind = FoundTimes(t[is_kind], known[is_kind], areas[is_kind])
-                one = self._made([EdgeRule("area", level)], [of_kind], truth[name])
+                one = self._made([EdgeRule("area", level)], [of_kind], truth[name], self._spans[name])
                 fits[name] = _NONE
                 if one is not None:
                     [fits[name]] = self._of_rows(one.error_ms, one.delay_ms, np.array([len(one.false)]))
@@ -480,11 +506,12 @@ def _grid(loads: Loads, parts: Sequence[Stretch], only: str | None) -> Iterator[
 
 def _within_touches(loads: Loads, parts: Sequence[Stretch]) -> Iterator[EdgeRule]:
     """Yield the rules of what happens within touches."""
-    for quantity in ("moved", "rise", "fall") if loads.taxels > 1 else ("rise", "fall"):
+    several, axes = ("moved",) * (loads.taxels > 1), ("shear_rise", "shear_fall") * loads.have_axes
+    for quantity in (*several, "rise", "fall", *axes):
         values = loads.values(quantity, parts, touched_ms=SETTLING_MS)
         for level in _levels(quantity, values, loads.noise_floor, 1):
-            for release, quiet_ms in product(RELEASES[1::2], QUIETS_WITHIN_MS):
-                for date in (None, (1.0 + release) / 2) if release < 1.0 else (None,):
+            for release, quiet_ms in product(RELEASES_WITHIN, QUIETS_WITHIN_MS):
+                for date in (None, (1.0 + release) / 2):
                     yield EdgeRule(quantity, level, release, quiet_ms, date, touched_ms=SETTLING_MS)
 
 
@@ -543,7 +570,7 @@ def _rank(rule: EdgeRule | PlainRule | None) -> int:
 
 def _is_onset(onset: _Best, end: _Best) -> bool:
     """Whether a label is that of the begin of a load; a load that falls begins where one ends."""
-    is_fall = onset.rule is not None and onset.rule.quantity in ("fall", "local_fall")
+    is_fall = onset.rule is not None and onset.rule.quantity in ("fall", "shear_fall", "local_fall")
     return abs(onset.fit.constant_ms) < abs(end.fit.constant_ms) and not is_fall
 
 

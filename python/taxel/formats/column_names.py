@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 
 AXES = ("x", "y", "z")
+#: What a layout may say of them.
+AXIS_CHOICES = (*AXES, "shear", "all", "xyz")
 
 #: Units of time as people write them.
 _UNITS_OF_TIME = {

@@ -24,7 +24,7 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
-from taxel.formats.column_names import AXES
+from taxel.formats.column_names import AXIS_CHOICES
 from taxel.formats.event_camera import Reduction
 from taxel.formats.lines import KINDS, THOUSANDS
 from taxel.formats.times import ISO, UNITS_US
@@ -330,8 +330,9 @@ class Layout:
         Unit of the readings, turned or not.
     rate_hz : float, Hz, above 0, optional
         Frames per second, if the recording has no times.
-    axis : {"x", "y", "z", "shear", "all"}, optional
-        Of taxels with three axes: the axis that is read, the length of x and y, or each axis as a source.
+    axis : {"x", "y", "z", "shear", "all", "xyz"}, optional
+        Of taxels with three axes: the axis that is read, the length of x and y, each axis as a source, or all axes as
+        the channels of one sensor.
     zeros_before_s : float, s, above 0, at most 60, optional
         Time that the sensor read 0 before recordings whose first frame is loaded, for example if a contact starts a
         trial.
@@ -386,7 +387,7 @@ class Layout:
         if self.rate_hz is not None:
             finite("rate_hz", self.rate_hz, least=1e-9, most=1e6)
         if self.axis is not None:
-            text("axis", self.axis, (*AXES, "shear", "all"))
+            text("axis", self.axis, AXIS_CHOICES)
         if self.zeros_before_s is not None:
             finite("zeros_before_s", self.zeros_before_s, least=1e-6, most=60.0)
         # Refuses a pitch beside places, and places of another number than rows x columns.

@@ -117,6 +117,12 @@ def sources_of(
     if layout.axis == "shear":
         yield name, _frames(path, layout, np.hypot(values[..., 0], values[..., 1]), t, names)
         return
+    if layout.axis == "xyz":
+        channels = replace(layout, rows=None, columns=None, pitch_mm=None, places=None)
+        taxels = names or [f"{row}_{column}" for row, column in np.ndindex(values.shape[1:3])]
+        of_axes = [f"{taxel}_{axis}" for taxel in taxels for axis in AXES]
+        yield name, _frames(path, channels, values.reshape(len(values), 1, -1), t, of_axes)
+        return
     for k, axis in enumerate(AXES):
         if layout.axis in (axis, "all"):
             label = f"{name} {axis}".strip() if layout.axis == "all" else name

@@ -81,6 +81,7 @@ OF_AXES = Question(
         'axis = "z"; or "x", "y"': {"axis": "z"},
         'axis = "all": each axis a source': {"axis": "all"},
         'axis = "shear": the length of x and y': {"axis": "shear"},
+        'axis = "xyz": all axes as one sensor': {"axis": "xyz"},
     },
 )
 

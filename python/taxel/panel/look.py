@@ -19,7 +19,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, first_line
 from taxel._base.table_text import Text
 from taxel._core import Error, FormatError, ProblemError
-from taxel.formats.column_names import AXES
+from taxel.formats.column_names import AXIS_CHOICES
 from taxel.formats.form import Form
 from taxel.formats.layout import (
     AXES_OF_ARRAYS,
@@ -377,7 +377,7 @@ def _fields(found: Found, kind: str, sheets: Sequence[str], path: Path) -> Itera
             units = {unit: {"time_unit": unit} for unit in UNITS_US}
             yield _choice("Unit of the time", "" if "time_unit" in _keys_of(found.questions) else data.time_unit, units)
     if layout.axis is not None:
-        yield _choice("Axes", layout.axis, {each: {"axis": each} for each in (*AXES, "shear", "all")})
+        yield _choice("Axes", layout.axis, {each: {"axis": each} for each in AXIS_CHOICES})
     rows, columns, guess = layout.rows, layout.columns, ""
     if layout.source is not None and rows is None and found.form is not None and found.form.lines:
         (rows, columns), guess = array_of(found.form, None, None, "")[0].shape, " (a guess)"

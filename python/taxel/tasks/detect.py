@@ -33,7 +33,7 @@ from taxel.recording.analysis.rest import Rest
 from taxel.recording.opening import sensors_of
 from taxel.spikes import to_us
 from taxel.tasks.info import sensor_lines
-from taxel.tasks.labels import GivenLabels, given_labels
+from taxel.tasks.labels import GivenLabels, given_labels, spans
 
 #: So many lines, beside that of each sensor, say what was measured.
 _LINES = 3
@@ -219,12 +219,13 @@ def detect(
     opened = sensors_of(recordings)
     with collected() as warnings:
         events, sources = ([], ()) if truth is None else given_labels(truth, opened, "truth", options.shift_ms)
+        lasting = [{} for _ in opened] if truth is None else spans(truth, opened, options.shift_ms)
         named = {label for of_recording in events for label in of_recording}
         known = [label for label in readout.labels if label in named] or list(readout.labels)
         each_labelled = [
             None if truth is None or recording.label in sources else events[k] for k, recording in enumerate(opened)
         ]
-        each_one = list(zip(opened, each_labelled, strict=True))
+        each_one = list(zip(opened, each_labelled, lasting, strict=True))
         workers = instance("workers", HERE if workers is None else workers, Workers)
         update(f"detecting in {opened[0].title}" if opened else "detecting", 0, 0)
         one_of = partial(_detected, readout, known, options)
@@ -270,7 +271,10 @@ def detect(
 def _score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:
     """Return the score of the detections in several examples as one."""
     return score_together(
-        [outcome.compared for outcome in outcomes], [outcome.example.labels for outcome in outcomes], window_ms
+        [outcome.compared for outcome in outcomes],
+        [outcome.example.labels for outcome in outcomes],
+        window_ms,
+        [outcome.example.spans for outcome in outcomes],
     )
 
 
@@ -290,12 +294,12 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
                 yield text
 
 
-#: A recording, and its labels if the truth is known.
-_One: TypeAlias = tuple[Recording, Mapping[str, Any] | None]
+#: A recording, its labels if the truth is known, and begins and ends of those that last.
+_One: TypeAlias = tuple[Recording, Mapping[str, Any] | None, Mapping[str, Any]]
 
 
 def _detected(readout: Readout | PlainRule, known: Sequence[str], options: DetectOptions, one: _One) -> Detected:
-    recording, labels = one
+    recording, labels, ends = one
     if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
         # Detections may lack or have wrong times.
         warn(f"{recording.title}: {recording.verdict}", stacklevel=3)
@@ -310,15 +314,15 @@ def _detected(readout: Readout | PlainRule, known: Sequence[str], options: Detec
     # Labels that the readout does not have do not count as missed.
     true = {} if labels is None else {label: labels.get(label, _NONE) for label in known}
     title = recording.title
-    example = Example(recording, true, tare, title.removesuffix(recording.label), title)
+    example = Example(recording, true, tare, title.removesuffix(recording.label), title, spans=ends)
     outcome = Outcome(title, example, found)
-    scored = score(outcome.compared, true, options.window_ms) if true else None
+    scored = score(outcome.compared, true, options.window_ms, ends) if true else None
     for label, ms in (readout._parts.get("training") or {}).get("constants_ms", {}).items():
         # As in the training, if these labels are of the same hand.
         moved = true | {label: true.get(label, _NONE) - round(to_us(ms))}
         if scored is None or not len(true.get(label, _NONE)):
             continue
-        second = score(outcome.compared, moved, options.window_ms)
+        second = score(outcome.compared, moved, options.window_ms, ends)
         if second.rank < scored.rank:
             true, scored = moved, second
             side = "after" if ms > 0 else "before"

@@ -117,6 +117,30 @@ def _times(
     return table._times(recording.path, source, trial_name(recording), side, begin_us, clock_of)
 
 
+def spans(
+    source: GivenLabels, recordings: Sequence[Recording], shift_ms: float = 0.0
+) -> list[dict[str, NDArray[np.int64]]]:
+    """Return begin and end, us, of the labels of each recording that have an end, shape (labels, 2), so much later."""
+    if not are_tables(source):
+        return [{} for _ in recordings]
+    table = None if source == "notes" else _opened(source, recordings)
+    each: list[dict[str, NDArray[np.int64]]] = []
+    for recording in recordings:
+        place = recording.path, recording.label, trial_name(recording), recording.side
+        clock_of = partial(getattr, recording, "clock")
+        rows = recording.notes if table is None else table._of(*place, _begin_of(recording, recordings), clock_of)
+        lasting = [
+            (row.text, row.t + round(to_us(shift_ms)), row.lasts) for row in rows if row.t is not None and row.lasts
+        ]
+        each.append(
+            {
+                label: np.array(sorted((t, t + lasts) for text, t, lasts in lasting if text == label), np.int64)
+                for label in dict.fromkeys(text for text, _, _ in lasting)
+            }
+        )
+    return each
+
+
 def _begin_of(recording: Recording, recordings: Sequence[Recording]) -> Callable[[], int]:
     """Return a function that returns the first time (us) of a recording: that of all sources of its file."""
     file = recording.path, trial_name(recording)

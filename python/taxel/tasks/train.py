@@ -33,7 +33,7 @@ from taxel.recording.analysis.rest import Rest, rest
 from taxel.recording.opening import sensors_of
 from taxel.tasks.held_together import held_together
 from taxel.tasks.info import sensor_lines
-from taxel.tasks.labels import GivenLabels, few, given_labels, labelled_trials
+from taxel.tasks.labels import GivenLabels, few, given_labels, labelled_trials, spans
 from taxel.tasks.train_result import Training
 
 #: Sensors of more taxels are no columns of a table.
@@ -109,9 +109,11 @@ def _train(
 ) -> Training:
     opened = labelled_trials(labels, recordings)
     labelled, unlabelled = given_labels(labels, opened, shift_ms=options.shift_ms)
+    lasting = spans(labels, opened, options.shift_ms)
     _check(opened, labelled, update)
     some = [k for k, each in enumerate(opened) if each.label not in unlabelled]
     opened, labelled = [opened[k] for k in some], [labelled[k] for k in some]
+    lasting = [lasting[k] for k in some]
     names = sorted({label for events in labelled for label in events})
     rests = [rest(recording, options.tare) for recording in opened]
     if options.recipe is None and "encoder.name" not in options.changes:
@@ -124,7 +126,10 @@ def _train(
     assert plan is not None
     column, held_with = held_together(labels, opened, options.hold_out)
     examples = _examples(opened, labelled, rests, plan)
-    examples = [example._replace(held_with=of) for example, of in zip(examples, held_with, strict=True)]
+    examples = [
+        example._replace(held_with=of, spans=ends)
+        for example, of, ends in zip(examples, held_with, lasting, strict=True)
+    ]
     if labels == "notes":
         examples = [
             example._replace(labels_of=each._main.facts.labels_of)
@@ -147,11 +152,7 @@ def _train(
     fitter = fitter_of(examples)
     if constants := _constants(fitter, update):
         examples = [
-            example._replace(
-                labels={
-                    label: times - round(1000.0 * constants.get(label, 0.0)) for label, times in example.labels.items()
-                }
-            )
+            example._replace(labels=_earlier(example.labels, constants), spans=_earlier(example.spans, constants))
             for example in examples
         ]
         fitter = fitter_of(examples)
@@ -170,6 +171,11 @@ def _train(
         for line in [*lines, *(line for recording in opened for line in sensor_lines(recording))][:_LINES]:
             warn(line)
     return replace(training, unlabelled=unlabelled, constants_ms=constants, held_by=column)
+
+
+def _earlier(times: Mapping[str, NDArray[np.int64]], constants: Mapping[str, float]) -> dict[str, NDArray[np.int64]]:
+    """Return times of labels less their constants, ms."""
+    return {label: each - round(1000.0 * constants.get(label, 0.0)) for label, each in times.items()}
 
 
 def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]], update: Progress) -> None:
@@ -281,7 +287,7 @@ def _within_touches(fitter: Fitter) -> Iterator[str]:
         if 2 * count > len(times[label]):
             yield (
                 f"{label}: {count} of {counted(len(times[label]), 'label')} lie within touches, but {label} is read as "
-                "the end of a touch, and nothing within a touch is learnt"
+                "the end of a touch, and no rule finds it within one"
             )
 
 
@@ -324,6 +330,7 @@ def _trained(
         update(f"scoring on {recording.title}", 0, 0)
         truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
         detections = run(readout, recording, tare=example.tare)
-        of_recording = Example(recording, truth, example.tare)
-        outcomes.append(Outcome(recording.title, of_recording, detections, score(detections, truth, options.window_ms)))
+        of_recording = Example(recording, truth, example.tare, spans=example.spans)
+        scored_one = score(detections, truth, options.window_ms, example.spans)
+        outcomes.append(Outcome(recording.title, of_recording, detections, scored_one))
     return Training(options, opened, trained._replace(readout=readout), scored, why, outcomes, rests)

@@ -17,8 +17,10 @@ from taxel.detect.scoring import score_rows
 from taxel.options import TrainOptions
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import Rest
+from taxel.recording.cut import span_us
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
+from taxel.tasks.intervals import ByIntervals, by_intervals
 
 #: Detections are known late that are known so long after their label, ms.
 _LATE_MS = 500.0
@@ -96,6 +98,20 @@ class Training:
         """The warnings of the training, and the labels that the readout detects no better than one of nothing."""
         return (*self.warned, *self.unreliable())
 
+    def by_intervals(self) -> dict[str, ByIntervals]:
+        """Return the score by intervals of the labels that have ends."""
+        of = [(each.example, found) for each, found in zip(self.outcomes, self.scored.found, strict=True)]
+        lasting = {label for example, _ in of for label in example.spans}
+        none, early = np.empty((0, 2), np.int64), np.array([round(to_us(self.options.window_ms)), 0])
+        return {
+            label: by_intervals(
+                # A detection may be before its label, as far as the window allows.
+                (found[found.label == label].t, example.spans.get(label, none) - early, span_us(recording))
+                for (example, found), recording in zip(of, self.recordings, strict=True)
+            )
+            for label in sorted(lasting)
+        }
+
     @property
     def how(self) -> str:
         """On which data the readout was scored, for the report, which shows its detections in the training data."""
@@ -126,6 +142,7 @@ class Training:
             "neurons": self.scored.neurons.to_dict(),
             "by_rule": list(self.readout.by_rule),
             "choices": {label: choice.to_dict() for label, choice in self.scored.choices.items()},
+            "by_intervals": {label: one._asdict() for label, one in self.by_intervals().items()},
             "mistakes": [
                 {
                     "recording": self.recordings[k].name,
@@ -218,9 +235,17 @@ class Training:
         return f"taxel detect RECORDING --readout {quote(readout)}{option}"
 
     def _kinds(self) -> Iterator[str]:
-        """Yield the labels that are learnt as kinds of touch, and what ends of touches are called."""
-        recipe = self.options.recipe
-        if recipe is not None and (kinds := recipes.kinds(recipe, self.readout.labels)):
+        """Yield what labels were taken for: what happens within a touch, its end, or kinds of touch."""
+        recipe, rules = self.options.recipe, self.readout.rules
+        inside = [label for label in self.readout.labels if label in rules and rules[label].touched_ms is not None]
+        if inside:
+            yield f"{', '.join(inside)}: taken for what happens within a touch"
+        if recipe is None:
+            return
+        for label in self.readout.labels:
+            if label not in inside and recipes.neuron_of(recipe, label) == "lift":
+                yield f"{label}: taken for the end of a touch"
+        if kinds := [label for label in recipes.kinds(recipe, self.readout.labels) if label not in inside]:
             yield f"{', '.join(kinds)}: learnt as a kind of touch, and detected at an age of the touch"
             yield f"  a label of the beginning of a touch must be named {recipes.names_of(recipe, 'contact')}"
             yield f"  a label of its end must be named {recipes.names_of(recipe, 'lift')}"
@@ -238,6 +263,8 @@ class Training:
         plain = self.scored.plain
         rule = plain.rules[label]
         yield self._choice(label)
+        if label in (lasting := self.by_intervals()):
+            yield f"  {lasting[label]!r}; {self.score[label].again} detected again within their label"
         if plain.together is None:
             yield f"no plain rule for {label}: {plain.lacks}"
         elif rule is None:

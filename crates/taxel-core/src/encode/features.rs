@@ -11,6 +11,7 @@ use super::local_sums::{LocalSums, SumPair};
 use super::moved::Moved;
 use super::peak_load::PeakLoad;
 use super::range_load::RangeLoad;
+use super::shear::Shear;
 use super::stream::Stream;
 use super::touched::Touched;
 use crate::rest::Rest;
@@ -26,6 +27,8 @@ pub(super) enum Feature {
     Load(LoadSum),
     /// What moved within the load, the rise and the fall of the sum.
     Moved(Moved),
+    /// The rise and the fall of the shear.
+    Shear(Shear),
     /// The largest local sums: above the rest, then above and below each running mean.
     Local(LocalSums),
     /// The load by running range.
@@ -41,7 +44,7 @@ pub(super) enum Feature {
 impl Feature {
     /// Whether it changes while the values hold.
     fn drifts(&self) -> bool {
-        matches!(self, Self::Local(_) | Self::Moved(_))
+        matches!(self, Self::Local(_) | Self::Moved(_) | Self::Shear(_))
     }
 
     /// Appends its values.
@@ -53,6 +56,7 @@ impl Feature {
             }
             Self::Load(load) => values.extend(load.take(now)),
             Self::Moved(moved) => values.extend(moved.take(now)),
+            Self::Shear(shear) => values.extend(shear.take(now)),
             Self::Local(sums) => {
                 let mut of_rest = true;
                 sums.take(now.t, now.held.as_flattened(), |SumPair { largest, .. }| {
@@ -72,6 +76,7 @@ impl Feature {
             Self::Area(loaded) => loaded.set_rest(taxel, rest),
             Self::Load(load) => load.set_rest(taxel, rest),
             Self::Moved(moved) => moved.set_rest(taxel, rest),
+            Self::Shear(shear) => shear.set_rest(taxel, rest),
             Self::Local(sums) => sums.set_rest(taxel, rest),
             Self::Range(_) => {}
             Self::Peak(peak) => peak.set_rest(taxel, rest),
@@ -97,6 +102,8 @@ struct FeatureRule {
     features: Vec<Feature>,
     /// When they count; at all other times they are 0. `None`: always.
     touched: Option<Touched>,
+    /// The axis of each channel, where taxels have three.
+    axes: Vec<usize>,
     /// The rest of each taxel as it was measured or set.
     rest: Rest<f64>,
     values: Vec<f64>,
@@ -113,7 +120,7 @@ pub(super) fn stream(
     trains: Trains,
 ) -> Box<dyn Stream> {
     let clock = Clock::Stamps { drifts: touched.is_some() || features.iter().any(Feature::drifts) };
-    let rule = FeatureRule { features, touched, rest, values: vec![], emit };
+    let rule = FeatureRule { features, touched, axes: array.axes(), rest, values: vec![], emit };
     Box::new(Driver::new(rule, Channels::grid(array), trains, clock))
 }
 
@@ -174,8 +181,10 @@ impl Rule for FeatureRule {
 
     fn set_rest(&mut self, channel: usize, rest: f64) {
         self.rest.set(channel, rest);
-        self.features.iter_mut().for_each(|feature| feature.set_rest(channel, rest));
-        if let Some(touched) = &mut self.touched {
+        let is_pressed = self.axes.get(channel).is_none_or(|&axis| axis == 2);
+        let follow = |feature: &&mut Feature| is_pressed || matches!(feature, Feature::Shear(_));
+        self.features.iter_mut().filter(follow).for_each(|feature| feature.set_rest(channel, rest));
+        if let Some(touched) = self.touched.as_mut().filter(|_| is_pressed) {
             touched.loaded().set_rest(channel, rest);
         }
     }

@@ -6,7 +6,7 @@ use crate::rest::{Baseline, Value, Waiting};
 use crate::{Array, Result};
 
 /// The time constant of the running means, us: chosen on slips of a gripper at 32 to 83 Hz.
-const MEAN_US: f64 = 100_000.0;
+pub(super) const MEAN_US: f64 = 100_000.0;
 
 /// Computes the changes from the values of all taxels.
 #[derive(Clone)]

@@ -12,6 +12,7 @@ use super::loaded::{Loaded, require_tare};
 use super::local_load::LocalLoad;
 use super::moved::Moved;
 use super::range_load::RangeLoad;
+use super::shear::Shear;
 use super::stream::Stream;
 use super::tare::Tare;
 use super::touched::Touched;
@@ -48,6 +49,11 @@ pub enum Quantity {
     Rise,
     /// The same below the running mean.
     Fall,
+    /// By how much the shear, the sum as a vector of channels whose names end in _x and _y above rest, differs from its running
+    /// mean of 100 ms while it is longer than that; smoothed over 20 ms.
+    ShearRise,
+    /// The same while it is shorter.
+    ShearFall,
     /// The largest sum over 3 x 3 taxels above a tracked rest, in units of its noise, as of [`LocalLoad`](super::LocalLoad):
     /// loads in noise, and above a rest that drifts.
     LocalLoad,
@@ -112,13 +118,14 @@ impl Quantity {
         };
         let loaded = || Loaded::new("plain rule", array, tare, noise_floor);
         // Each feature, with the quantities that its values are.
-        let kinds: [&[Self]; 7] = [
+        let kinds: [&[Self]; 8] = [
             &[Self::Load, Self::LoadWithoutLargest],
             &[Self::RangeLoad],
             &[Self::Count],
             &[Self::Area],
             &[Self::BeginArea],
             &[Self::Moved, Self::Rise, Self::Fall],
+            &[Self::ShearRise, Self::ShearFall],
             &[Self::LocalLoad, Self::LocalRise, Self::LocalFall],
         ];
         let (mut features, mut values) = (vec![], vec![]);
@@ -131,6 +138,7 @@ impl Quantity {
                 Self::Area => Feature::Area(loaded()?),
                 Self::BeginArea => Feature::Begin(BeginArea::new(levels, loaded()?, array.len())),
                 Self::Moved => Feature::Moved(Moved::new(array, require_tare("plain rule", tare)?)?),
+                Self::ShearRise => Feature::Shear(Shear::new(array, require_tare("plain rule", tare)?)?),
                 _ => {
                     let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
                     local.least_noise *= step_of(noise_floor);

@@ -64,12 +64,24 @@ impl Tare {
         Self { array: array.clone(), rest: padded(&self.rest), noise: padded(&self.noise), ..self.clone() }
     }
 
-    /// The rest of each taxel of an array; unknown if the taxel does not exist.
+    /// The rest of each taxel of an array; unknown if the taxel does not exist. Of three axes that of x and y is unknown, too:
+    /// z says what is touched.
     ///
     /// # Errors
     ///
     /// `Problem` if the tare is of an array of another shape.
     pub(super) fn rest_of(&self, array: &Array) -> Result<Rest<f64>> {
+        let (mut rest, axes) = (self.rest_of_axes(array)?, array.axes());
+        rest.iter_mut().zip(axes).filter(|(_, axis)| *axis < 2).for_each(|(rest, _)| *rest = f64::NO_REST);
+        Ok(Rest::measured(rest))
+    }
+
+    /// The rest of each taxel of an array, or of each axis of it; likewise.
+    ///
+    /// # Errors
+    ///
+    /// As [`Tare::rest_of`].
+    pub(super) fn rest_of_axes(&self, array: &Array) -> Result<Vec<f64>> {
         let (from, to) = (&self.array, array);
         if !from.fits(to) {
             let others =
@@ -83,7 +95,7 @@ impl Tare {
             ));
         }
         let rest_of = |(taxel, rest): (usize, &Option<f64>)| rest.filter(|_| array.has(taxel)).unwrap_or(f64::NO_REST);
-        Ok(Rest::measured(self.rest.iter().enumerate().map(rest_of).collect()))
+        Ok(self.rest.iter().enumerate().map(rest_of).collect())
     }
 
     /// The rest of an array's frames, which follows from the tare on.
@@ -93,7 +105,7 @@ impl Tare {
     /// `Problem` if the tare is of an array of another shape, or a number of `following` is not in its range.
     pub fn followed(&self, array: &Array, following: Following) -> Result<FollowedRest> {
         following.check()?;
-        Ok(FollowedRest::new(following, array, self.rest_of(array)?.values(), &self.place_noise()))
+        Ok(FollowedRest::new(following, array, &self.rest_of_axes(array)?, &self.place_noise()))
     }
 
     /// The noise of each taxel; 0 where it is not known.

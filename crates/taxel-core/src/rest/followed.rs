@@ -121,6 +121,8 @@ pub struct FollowedRest {
     /// The values less what the rest moved.
     values: Vec<f32>,
     waiting: Waiting,
+    /// The axis of each channel, where the channels are axes of taxels.
+    axes: Vec<usize>,
     /// The time of the latest frame, us.
     t: Option<i64>,
     /// As many taxels as a touch has.
@@ -143,6 +145,7 @@ impl FollowedRest {
             count: vec![0; n],
             values: vec![0.0; n],
             waiting: Waiting::default(),
+            axes: array.axes(),
             t: None,
             touch: if array.has_neighbours() { TOUCH } else { 1 },
             left: None,
@@ -172,7 +175,11 @@ impl FollowedRest {
         let step = |tau: f64| -(-(time as f64) / (1e6 * tau)).exp_m1() as f32;
         let absorb_us = if self.stays() { ABSORB_S } else { self.following.absorb_s } * 1e6;
         self.waiting.fill(&mut self.values, &self.rest);
-        let Self { rest, floor, moved, above, count, .. } = self;
+        let Self { rest, floor, moved, above, count, axes, .. } = self;
+        // The rest of x and y stays while z, which says what is touched, is above its own.
+        if axes.iter().zip(&*above).zip(&*floor).any(|((&axis, above), floor)| axis == 2 && above >= floor) {
+            axes.iter().zip(&mut *above).filter(|(axis, _)| **axis < 2).for_each(|(_, above)| *above = 0.0);
+        }
         let taxels = Taxels { rest, floor, moved, above, count };
         let steps = [NEAR_S, FAST_S].map(step);
         let absorb_us = absorb_us as i32;
