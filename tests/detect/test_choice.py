@@ -110,7 +110,7 @@ def test_what_is_better_beyond_chance_runs_else_what_knows_much_earlier(neuron, 
         [score(Detections(["on"] * (200 - n), events[n:], events[n:] + delay), {"on": events}) for n in wrong]
         for wrong, delay in ((neuron, 1_000), (rule, 12_000 if earlier else 1_000))
     ]
-    choice = chosen(["on"], 10.0, *ways)["on"]
+    choice = chosen(["on"], 10.0, tuple(ways), {})["on"]
     assert (choice.by_rule, choice.neuron.mistakes, choice.rule.mistakes) == (better == "rule", sum(neuron), sum(rule))
 
 
@@ -134,9 +134,11 @@ def test_a_detection_that_is_far_off_is_half_a_mistake(neuron, rule, better, by_
         ]
         for wrong in (neuron, rule)
     ]
-    choice = chosen(["on"], 10.0, *ways)["on"]
+    choice = chosen(["on"], 10.0, tuple(ways), {})["on"]
     assert ("rule" if choice.by_rule else "neuron", choice.by_chance) == (better, by_chance)
-    assert [each[:2] for each in choice[-2:]] == [tuple(np.sum(wrong, axis=0)) for wrong in (neuron, rule)]
+    assert [each[:2] for each in (choice.neuron, choice.rule)] == [
+        tuple(np.sum(wrong, axis=0)) for wrong in (neuron, rule)
+    ]
 
 
 @pytest.mark.filterwarnings("ignore:.*cannot be learnt")

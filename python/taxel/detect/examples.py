@@ -72,6 +72,10 @@ class Example(NamedTuple):
     labels_of: str = ""
     held_with: str = ""
 
+    def _since(self, t_us: float) -> Example:
+        """Return the example without its labels before a time, us."""
+        return self._replace(labels={label: times[times >= t_us] for label, times in self.labels.items()})
+
 
 def name_of(k: int, example: Example) -> str:
     """Return what errors call the example k."""
