@@ -76,20 +76,6 @@ def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
     assert (judged.neurons.found, judged.plain.together.found, judged.together.found) == (0, 36, 36)
 
 
-@pytest.mark.parametrize(("delay_ms", "fits"), [(5.0, 2), (30.0, 0)])
-def test_no_neuron_is_fitted_to_lose_to_a_rule_without_mistakes_that_knows_before_it_may_fire(
-    delay_ms, fits, monkeypatch
-):
-    fitted = []
-    best = Fitter._best
-    monkeypatch.setattr(Fitter, "_best", lambda *how: fitted.append(how[1]) or best(*how))
-    recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "refractory": 100.0, "delay_ms": delay_ms})
-    fitter = Fitter(pressed_channels(), recipe)
-    # A frame is known at its end, 10 ms later.
-    assert fitter.by_rule(fitter.whole) == ("on",)
-    assert fitted == ["on"] * fits
-
-
 @pytest.mark.parametrize(
     ("neuron", "rule", "earlier", "better"),
     [

@@ -259,11 +259,7 @@ class Fitter:
     def fit(self, parts: Sequence[Part] | None = None) -> Trained:
         """Return neurons and rules of parts of the examples, by default of all; the neurons run."""
         parts = self.whole if parts is None else parts
-        return self._fit(parts, self.rules(parts))
-
-    def _fit(self, parts: Sequence[Part], rules: Rules) -> Trained:
-        """Return the neurons of the labels that rules are given for, beside these rules; the neurons run."""
-        plan = self._recipe
+        plan, rules = self._recipe, self.rules(parts)
         learners: dict[str, ConeR | TrainedNeuron] = {}
         delays, alignments = {}, {}
         points: dict[str, Mapping[str, Any]] = {}
@@ -307,42 +303,12 @@ class Fitter:
             halves = [fold for fold in split(self.examples, parts, 2) if self._has_all(fold.train)]
         except ProblemError:
             halves = []
-        folds = halves or [Fold(parts, parts)]
-        tuned = [self.rules(fold.train) for fold in folds]
-        sure = self._surely_by_rule(folds, tuned)
-        if not (others := [label for label in self.labels if label not in sure]):
-            return self.labels
         fitted: list[tuple[Trained, Sequence[Part]]] = []
-        for fold, rules in zip(folds, tuned, strict=True):
+        for fold in halves or [Fold(parts, parts)]:
             with collected(), contextlib.suppress(ProblemError):
-                trained = self._fit(fold.train, {label: rules[label] for label in others})
-                fitted.append((trained, [self.scored(part) for part in fold.test]))
-        better = self.compared(others, fitted, CHOOSING) if fitted else {}
-        return tuple(label for label in self.labels if label in sure or (label in better and better[label].by_rule))
-
-    def _surely_by_rule(self, folds: Sequence[Fold], tuned: Sequence[Rules]) -> frozenset[str]:
-        """Return the labels that no neuron detects better than rules do, so that none needs to be fitted.
-
-        A rule makes no mistake in what it did not learn from, nor in its changes, is never far off, and knows before
-        the neuron is trained to fire.
-        """
-        tested = [(rules, self.scored(part)) for fold, rules in zip(folds, tuned, strict=True) for part in fold.test]
-
-        def score(fitter: Fitter) -> Mapping[str, Score]:
-            found = [fitter._by_rules(rules, part) for rules, part in tested]
-            return fitter.score(found, [part for _, part in tested]).by_label
-
-        scores = [score(fitter) for fitter in (self, *(of for name, of in self._changed.items() if name in CHOOSING))]
-
-        def is_sure(label: str) -> bool:
-            one, (_, delay_ms) = scores[0][label], self._recipe.learner_of(label)
-            received = self._recipe._received(self._recipe.points_of(label)[0].values)
-            fires_ms = received.latency_ms + delay_ms
-            with_it = [of[label] for of in scores if label in of]
-            right = not any(of.rank[0] or np.any(np.abs(of.errors_ms) > self.off_ms) for of in with_it)
-            return right and len(one.delays_ms) > 0 and bool(np.median(one.delays_ms) <= fires_ms)
-
-        return frozenset(label for label in self.labels if label in scores[0] and is_sure(label))
+                fitted.append((self.fit(fold.train), [self.scored(part) for part in fold.test]))
+        better = self.compared(self.labels, fitted, CHOOSING) if fitted else {}
+        return tuple(label for label, choice in better.items() if choice.by_rule)
 
     def _has_all(self, parts: Sequence[Part]) -> bool:
         """Whether parts have an event of each label."""
