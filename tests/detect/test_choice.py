@@ -76,20 +76,6 @@ def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
     assert (judged.neurons.found, judged.plain.together.found, judged.together.found) == (0, 36, 36)
 
 
-@pytest.mark.parametrize(("delay_ms", "fits"), [(5.0, 2), (30.0, 0)])
-def test_no_neuron_is_fitted_to_lose_to_a_rule_without_mistakes_that_knows_before_it_may_fire(
-    delay_ms, fits, monkeypatch
-):
-    fitted = []
-    best = Fitter._best
-    monkeypatch.setattr(Fitter, "_best", lambda *how: fitted.append(how[1]) or best(*how))
-    recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "refractory": 100.0, "delay_ms": delay_ms})
-    fitter = Fitter(pressed_channels(), recipe)
-    # A frame is known at its end, 10 ms later.
-    assert fitter.by_rule(fitter.whole) == ("on",)
-    assert fitted == ["on"] * fits
-
-
 @pytest.mark.parametrize(
     ("neuron", "rule", "earlier", "better"),
     [
@@ -110,7 +96,7 @@ def test_what_is_better_beyond_chance_runs_else_what_knows_much_earlier(neuron, 
         [score(Detections(["on"] * (200 - n), events[n:], events[n:] + delay), {"on": events}) for n in wrong]
         for wrong, delay in ((neuron, 1_000), (rule, 12_000 if earlier else 1_000))
     ]
-    choice = chosen(["on"], 10.0, *ways)["on"]
+    choice = chosen(["on"], 10.0, tuple(ways), {})["on"]
     assert (choice.by_rule, choice.neuron.mistakes, choice.rule.mistakes) == (better == "rule", sum(neuron), sum(rule))
 
 
@@ -134,9 +120,11 @@ def test_a_detection_that_is_far_off_is_half_a_mistake(neuron, rule, better, by_
         ]
         for wrong in (neuron, rule)
     ]
-    choice = chosen(["on"], 10.0, *ways)["on"]
+    choice = chosen(["on"], 10.0, tuple(ways), {})["on"]
     assert ("rule" if choice.by_rule else "neuron", choice.by_chance) == (better, by_chance)
-    assert [each[:2] for each in choice[-2:]] == [tuple(np.sum(wrong, axis=0)) for wrong in (neuron, rule)]
+    assert [each[:2] for each in (choice.neuron, choice.rule)] == [
+        tuple(np.sum(wrong, axis=0)) for wrong in (neuron, rule)
+    ]
 
 
 @pytest.mark.filterwarnings("ignore:.*cannot be learnt")

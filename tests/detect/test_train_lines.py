@@ -1,6 +1,7 @@
 """``taxel train`` judges itself: the first line says on what, the next ones how well, what was felt."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ from discs import ARRAY, tare, touches
 from shell import call
 
 import taxel
+from taxel.detect.choice import Choice, Made
+from taxel.options import TrainOptions
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -65,3 +68,26 @@ def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Pat
     assert re.search(r"contact: \w+ runs: 1 mistake of 7 \(", out)
     code, _, error = call(capsys, *arguments, "--folds", 2, "-o", tmp_path / "r.json")
     assert (code, "the sensor felt nothing" in error) == (2, True), "folds that were asked for are not left out"
+
+
+@pytest.mark.parametrize(
+    ("by_chance", "mistakes", "said"),
+    [
+        (True, {"a dead taxel": (2, 40)}, "0, which may be chance); KNOWN; with a dead taxel 2 (rule 40)"),
+        (False, {"gain x 0.8": (1, 9), "gain x 1.25": (2, 7)}, "0; changed 3, rule 16); KNOWN"),
+        (
+            True,
+            {"a dead taxel": (1, 0), "a stuck taxel": (2, 40)},
+            "0, which may be chance); KNOWN; with a stuck taxel 2 (rule 40)",
+        ),
+        (True, {"a dead taxel": (1, 0)}, "0, which may be chance); KNOWN"),
+    ],
+)
+def test_a_line_says_what_decided_and_the_worst_day_of_what_runs(tmp_path: Path, by_chance, mistakes, said) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    training = taxel.train(taxel.open(recording), labels, TrainOptions(tare=0.08))
+    choice = Choice(False, by_chance, 10.0, Made(1, 0, 19.0, 1.0), Made(0, 0, 33.0, 1.0), mistakes)
+    made = training.made._replace(readout=training.readout.using("neuron"))
+    training = replace(training, scored=replace(training.scored, choices={"contact": choice}), made=made)
+    said = said.replace("KNOWN", "known 19 ms after the label, rule 33")
+    assert f"contact: neuron runs: 1 mistake of 6 (rule {said}" in training.lines()

@@ -76,6 +76,10 @@ class Example(NamedTuple):
     held_with: str = ""
     spans: Mapping[str, Any] = MappingProxyType({})
 
+    def _since(self, t_us: float) -> Example:
+        """Return the example without its labels before a time, us."""
+        return self._replace(labels={label: times[times >= t_us] for label, times in self.labels.items()})
+
 
 def name_of(k: int, example: Example) -> str:
     """Return what errors call the example k."""

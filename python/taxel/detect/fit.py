@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +23,8 @@ from taxel.array import Array
 from taxel.detect.ages import in_frames
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.board import noise_floor
-from taxel.detect.choice import chosen
+from taxel.detect.changes import CHOOSING, LOADED, OF_FRAMES, TOMORROW, changed
+from taxel.detect.choice import Choice, Ways, chosen
 from taxel.detect.detector import raised
 from taxel.detect.drift import followed, rest_of
 from taxel.detect.examples import Example, array_of, check_examples, frame_ms, name_of, sizes_of, unit_of
@@ -116,9 +117,9 @@ def fit(
     -----
     Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours). The event is the label,
     or where the recipe aligns labels what the sensor felt of it. Which of neuron and rule is better is found by
-    training on each half of the data and detecting in the other: what makes fewer mistakes by more than a standard
-    error over the recordings, else what knows earlier by more than a fifth of the window, then what makes fewer, then
-    what is nearer to the labels.
+    training on each half of the data and detecting in the other, as it was recorded and as it might be on another day
+    (`taxel.detect.changes`): what makes fewer mistakes by more than a standard error over the recordings, else what
+    knows earlier by more than a fifth of the window, then what makes fewer.
 
     Examples
     --------
@@ -207,22 +208,58 @@ class Fitter:
         self.labels = _labels_to_learn(self.examples, recipe)
         #: What keeps rules from being tried; empty where they are.
         self.lacks = lacks(self.examples)
-        self._tuning: Tuning | None = None
-        if not self.lacks:
-            loads = Loads(self.examples, clocks, self.noise_floor, self.report)
-            self._tuning = Tuning(loads, self.labels, self.window_ms)
+        self._loads = None if self.lacks else Loads(self.examples, clocks, self.noise_floor, self.report)
+        self._tuning = None if self._loads is None else Tuning(self._loads, self.labels, self.window_ms)
         # The quantity whose thresholds the labels are.
         self._own = min((example.labels_of for example in self.examples if example.labels_of), default=None)
         self._trains: dict[str, _Received] = {}
+        self._read: Callable[[int], Example] = self.examples.__getitem__
+
+    @cached_property
+    def _changed(self) -> dict[str, Fitter]:
+        """Fitters like this one that detect in other readings, by what is changed; they learn nothing."""
+        if (loads := self._loads) is None:
+            return {}
+
+        @lru_cache(maxsize=1)
+        def read(name: str, k: int) -> Example:
+            return followed(changed(self.examples[k], name, self.noise_floor, loads.loaded_us[k]), self._rest)
+
+        def reading(name: str) -> Fitter:
+            other = copy(self)
+            other._read, other._trains = partial(read, name), {}
+            other._loads = Loads(self.examples, self.clocks, self.noise_floor, self.report, other._read)
+            if name == LOADED:
+                other.examples = [example._since(t) for example, t in zip(self.examples, loads.loaded_us, strict=True)]
+            return other
+
+        apply = CHOOSING if loads.taxels < 2 else CHOOSING | TOMORROW
+        return {name: reading(name) for name in apply if loads.are_frames or name not in OF_FRAMES}
+
+    def compared(
+        self,
+        labels: Sequence[str],
+        trained: Sequence[tuple[Trained, Sequence[Part]]],
+        changes: Collection[str] = (*CHOOSING, *TOMORROW),
+    ) -> dict[str, Choice]:
+        """Return which of neuron and rule detects each label better in parts that a training did not learn from."""
+        if not labels:
+            return {}
+        parts = [part for _, each in trained for part in each]
+
+        def scores(fitter: Fitter) -> Ways:
+            found = [fitter.detected(one, part) for one, each in trained for part in each]
+            return tuple(
+                fitter.scores([getattr(one, way) for one in found], parts) for way in ("by_neurons", "by_rules")
+            )
+
+        changed = {name: scores(fitter) for name, fitter in self._changed.items() if name in changes}
+        return chosen(labels, self.off_ms, scores(self), changed)
 
     def fit(self, parts: Sequence[Part] | None = None) -> Trained:
         """Return neurons and rules of parts of the examples, by default of all; the neurons run."""
         parts = self.whole if parts is None else parts
-        return self._fit(parts, self.rules(parts))
-
-    def _fit(self, parts: Sequence[Part], rules: Rules) -> Trained:
-        """Return the neurons of the labels that rules are given for, beside these rules; the neurons run."""
-        plan = self._recipe
+        plan, rules = self._recipe, self.rules(parts)
         learners: dict[str, ConeR | TrainedNeuron] = {}
         delays, alignments = {}, {}
         points: dict[str, Mapping[str, Any]] = {}
@@ -266,43 +303,12 @@ class Fitter:
             halves = [fold for fold in split(self.examples, parts, 2) if self._has_all(fold.train)]
         except ProblemError:
             halves = []
-        folds = halves or [Fold(parts, parts)]
-        tuned = [self.rules(fold.train) for fold in folds]
-        sure = self._surely_by_rule(folds, tuned)
-        if not (others := [label for label in self.labels if label not in sure]):
-            return self.labels
-        found: list[Found] = []
-        parts_found: list[Part] = []
-        for fold, rules in zip(folds, tuned, strict=True):
-            compared = {label: rules[label] for label in others}
+        fitted: list[tuple[Trained, Sequence[Part]]] = []
+        for fold in halves or [Fold(parts, parts)]:
             with collected(), contextlib.suppress(ProblemError):
-                trained = self._fit(fold.train, compared)
-                tested = [self.scored(part) for part in fold.test]
-                found += [self.detected(trained, part) for part in tested]
-                parts_found += tested
-        each = ([one.by_neurons for one in found], [one.by_rules for one in found])
-        ways = (self.scores(way, parts_found) for way in each)
-        better = chosen(others, self.off_ms, *ways) if found else {}
-        return tuple(label for label in self.labels if label in sure or (label in better and better[label].by_rule))
-
-    def _surely_by_rule(self, folds: Sequence[Fold], tuned: Sequence[Rules]) -> frozenset[str]:
-        """Return the labels that no neuron detects better than rules do, so that none needs to be fitted.
-
-        A rule makes no mistake in what it did not learn from, is never far off, and knows before the neuron is trained
-        to fire.
-        """
-        tested = [[self.scored(part) for part in fold.test] for fold in folds]
-        by_rules = [self._by_rules(rules, part) for rules, each in zip(tuned, tested, strict=True) for part in each]
-        score = self.score(by_rules, [part for each in tested for part in each])
-
-        def is_sure(label: str) -> bool:
-            one, (_, delay_ms) = score.by_label[label], self._recipe.learner_of(label)
-            received = self._recipe._received(self._recipe.points_of(label)[0].values)
-            fires_ms = received.latency_ms + delay_ms
-            right = not one.rank[0] and bool(np.all(np.abs(one.errors_ms) <= self.off_ms))
-            return right and len(one.delays_ms) > 0 and bool(np.median(one.delays_ms) <= fires_ms)
-
-        return frozenset(label for label in self.labels if label in score.by_label and is_sure(label))
+                fitted.append((self.fit(fold.train), [self.scored(part) for part in fold.test]))
+        better = self.compared(self.labels, fitted, CHOOSING) if fitted else {}
+        return tuple(label for label, choice in better.items() if choice.by_rule)
 
     def _has_all(self, parts: Sequence[Part]) -> bool:
         """Whether parts have an event of each label."""
@@ -350,9 +356,9 @@ class Fitter:
 
     def _by_rules(self, rules: Rules, part: Part) -> Detections:
         """Return what the rule of each label detects of it in a part of an example."""
-        if self._tuning is None or not rules:
+        if self._loads is None or not rules:
             return Detections([], [], [])
-        found = {label: self._tuning.detected(rule, label, part) for label, rule in rules.items()}
+        found = {label: self._loads.detected(rule, label, part) for label, rule in rules.items()}
         labels = [label for label, one in found.items() for _ in one.t]
         t, known = (np.concatenate([getattr(one, name) for one in found.values()]) for name in ("t", "known"))
         order = np.argsort(t, kind="stable")
@@ -370,8 +376,8 @@ class Fitter:
 
     def inside_loads(self, labels: Sequence[str]) -> dict[str, int]:
         """Return how many events of each label lie within a load, farther from its begin and end than the window."""
-        assert self._tuning is not None
-        return {label: self._tuning.loads.inside(label, round(float(to_us(self.window_ms)))) for label in labels}
+        assert self._loads is not None
+        return {label: self._loads.inside(label, round(float(to_us(self.window_ms)))) for label in labels}
 
     def labels_in(self, label: str, parts: Sequence[Part]) -> list[NDArray[np.int64]]:
         """Return the events of a label in parts of the examples, us, ascending."""
@@ -398,7 +404,7 @@ class Fitter:
         return self._trains[key]
 
     def _encoded(self, k: int, received: Encoder, point: Mapping[str, Any]) -> SpikeTrains:
-        example, encoder = self.examples[k], self._recipe.encoder
+        example, encoder = self._read(k), self._recipe.encoder
         trains = example.source
         if isinstance(trains, SpikeTrains):
             trains = trains.split_by_sign() if trains.signed else trains
@@ -466,12 +472,12 @@ class Fitter:
     def _felt(self, label: str, parts: Sequence[Part], rule: PlainRule | None) -> list[NDArray[np.float64]] | None:
         """Return when a rule felt each event of a label in parts, us, NaN of those that it misses; None if many are."""
         labels = self.labels_in(label, parts)
-        if rule is None or self._tuning is None:
+        if rule is None or self._loads is None:
             return None
         times = [np.full(len(each), np.nan) for each in labels]
         for felt, given, part in zip(times, labels, parts, strict=True):
             # The trains of what was felt come at its own time, which the rule's constant is not taken off.
-            t = self._tuning.detected(rule, label, part).t + round(float(to_us(rule.constant_ms)))
+            t = self._loads.detected(rule, label, part).t + round(float(to_us(rule.constant_ms)))
             if (pairs := tally(t, t, given, round(to_us(WINDOW_MS)))) is not None:
                 felt[pairs.events] = t[pairs.detected]
         count = sum(map(len, labels))

@@ -13,7 +13,7 @@ import numpy as np
 from taxel._base.messages import collected
 from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress
-from taxel.detect.choice import Choice, chosen
+from taxel.detect.choice import Choice
 from taxel.detect.examples import Example
 from taxel.detect.fit import Fitter, Found, Rules, Trained
 from taxel.detect.folds import Fold, Part, folds_of
@@ -192,15 +192,15 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
         for of_fold, parts_found in zip(trained, found, strict=True)
         for one in parts_found
     ]
-    ways = ("by_neurons", "by_rules")
-    neurons, rules = (fitter.score(each(way), parts) for way in ways)
+    neurons, rules = (fitter.score(each(way), parts) for way in ("by_neurons", "by_rules"))
     best = fitter.rules(fitter.whole)
     tuned = {label: rule if rules[label].found else None for label, rule in best.items()}
     own_rules = fitter.rules(fitter.whole, own=True)
     own_score = (own_rules, fitter.score(each("by_own"), parts)) if any(own_rules.values()) else None
     plain = PlainScore(tuned, None if fitter.lacks else rules, own_score, fitter.lacks)
     with_rules = [label for label in fitter.labels if tuned[label] is not None]
-    choices = chosen(with_rules, fitter.off_ms, *(fitter.scores(each(way), parts) for way in ways))
+    tested = [(one, [fitter.scored(part) for part in fold.test]) for fold, one in zip(folds, trained, strict=True)]
+    choices = fitter.compared(with_rules, tested)
     better = tuple(label for label, choice in choices.items() if choice.by_rule)
     joined, truths, spans = _by_example(fitter, parts, run)
     scores = tuple(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import NamedTuple, Self, TypeAlias
 
@@ -14,6 +14,7 @@ from taxel._base.progress import Progress, reporting
 from taxel.detect.detector import tare_text
 from taxel.detect.examples import Example, frame_ms, name_of, unit_of
 from taxel.detect.floors import TOUCH
+from taxel.detect.plain_rule import PlainRule
 from taxel.detect.scoring import APART_US
 from taxel.events import Events
 from taxel.frames import Frames
@@ -84,15 +85,22 @@ class EdgeRule(NamedTuple):
 class Loads:
     """Hold the quantities of (checked) examples, each computed once when it is asked for.
 
-    The examples are one after the other on one clock, so far apart that nothing of one pairs with another.
+    The examples are one after the other on one clock, so far apart that nothing of one pairs with another. `read`
+    returns an example, by its place, with other readings that are measured instead.
     """
 
     def __init__(
-        self, examples: Sequence[Example], clocks: Sequence[Clock], noise_floor: float, report: Progress
+        self,
+        examples: Sequence[Example],
+        clocks: Sequence[Clock],
+        noise_floor: float,
+        report: Progress,
+        read: Callable[[int], Example] | None = None,
     ) -> None:
         self.noise_floor, self.unit = noise_floor, unit_of(examples)
         self.names = sorted({name for example in examples for name in example.labels})
         self._examples, self._clocks, self._report = examples, clocks, report
+        self._read = examples.__getitem__ if read is None else read
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
@@ -145,8 +153,7 @@ class Loads:
             self._report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
             together = next((names for names in _TOGETHER if quantity in names), (quantity,))
             measured = [
-                _curves(together, how, self.noise_floor, example, *clock)
-                for example, clock in zip(self._examples, self._clocks, strict=True)
+                _curves(together, how, self.noise_floor, self._read(k), *clock) for k, clock in enumerate(self._clocks)
             ]
             self._curves |= {
                 (name, *how): list(of) for name, of in zip(together, zip(*measured, strict=True), strict=True)
@@ -236,6 +243,21 @@ class Loads:
         each = zip(self._examples, self._shift, strict=True)
         return np.concatenate([none, *(example.spans.get(name, none) + shift for example, shift in each)])
 
+    @cached_property
+    def loaded_us(self) -> list[float]:
+        """The middle of the first touch of each example that is not short, us by its clock; else minus infinity."""
+        if not self.have_rest:
+            return [-np.inf] * len(self._examples)
+        edges, middles = self.edges(self.of_touches), []
+        for k, *_ in self.whole_examples:
+            here = self.windows([(k, -np.inf, np.inf)])
+            begins, ends = (np.sort(self.off(edge.between(here), k).t) for edge in edges)
+            whole = begins[begins < ends.max(initial=-(2**62))]
+            lasts = ends[np.searchsorted(ends, whole, side="right")] - whole
+            long = np.flatnonzero(2 * lasts >= np.median(lasts)) if len(lasts) else lasts
+            middles.append(float(whole[long[0]] + lasts[long[0]] / 2) if len(long) else -np.inf)
+        return middles
+
     def inside(self, name: str, away_us: int) -> int:
         """Return how many labels of a name lie within a load, so far from its begin and its end at least."""
         if not self.have_rest:
@@ -247,6 +269,25 @@ class Loads:
         )
         lasts = np.searchsorted(ends, times + away_us) == np.searchsorted(ends, times - away_us, side="right")
         return int(np.count_nonzero((began > ended) & lasts))
+
+    def detected(self, rule: PlainRule | None, label: str, part: Stretch) -> FoundTimes:
+        """Return what the rule of a label detects of it in a part of an example, as `taxel.detect.run` finds it."""
+        if rule is None:
+            return FoundTimes(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+        label_index = rule._parts["labels"].index(label)
+        if isinstance(rule.age_ms, str):
+            edges = self.at_end()
+        elif rule.age_ms is None:
+            numbers = rule.quantity, rule.level, rule.release, rule.quiet_ms, rule.date, rule.levels
+            edges = self.edges(EdgeRule(*numbers, rule.touched_ms))[label_index]
+            edges = edges._replace(t=edges.t - round(float(to_us(rule.constant_ms))))
+        else:
+            edges = self.at_age(rule.age_ms)
+        found = self.off(edges.between(self.windows([part])), part[0])
+        if rule.age_ms is None:
+            return found
+        is_label = (found.value >= rule.level) == bool(label_index)
+        return found._replace(t=found.t[is_label], known=found.known[is_label])
 
     def windows(self, parts: Iterable[Stretch]) -> NDArray[np.int64]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""

@@ -397,25 +397,6 @@ class Tuning:
         errors[pairs.events], delays[pairs.events] = pairs.errors_ms, pairs.delays_ms
         return errors.reshape(rows, -1), delays.reshape(rows, -1), is_false
 
-    def detected(self, rule: PlainRule | None, label: str, part: Stretch) -> FoundTimes:
-        """Return what the rule of a label detects of it in a part of an example, as `taxel.detect.run` finds it."""
-        if rule is None:
-            return FoundTimes(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
-        label_index = rule._parts["labels"].index(label)
-        if isinstance(rule.age_ms, str):
-            edges = self.loads.at_end()
-        elif rule.age_ms is None:
-            numbers = rule.quantity, rule.level, rule.release, rule.quiet_ms, rule.date, rule.levels
-            edges = self.loads.edges(EdgeRule(*numbers, rule.touched_ms))[label_index]
-            edges = edges._replace(t=edges.t - round(float(to_us(rule.constant_ms))))
-        else:
-            edges = self.loads.at_age(rule.age_ms)
-        found = self.loads.off(edges.between(self.loads.windows([part])), part[0])
-        if rule.age_ms is None:
-            return found
-        is_label = (found.value >= rule.level) == bool(label_index)
-        return found._replace(t=found.t[is_label], known=found.known[is_label])
-
     def _for_kinds(
         self,
         touches: Mapping[float | str, FoundTimes],

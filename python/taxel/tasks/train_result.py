@@ -12,6 +12,7 @@ import numpy as np
 from taxel._base.arguments import text
 from taxel._base.messages import counted, three_digits
 from taxel.detect import Judged, Outcome, Readout, Score, Trained, recipes
+from taxel.detect.changes import CHOOSING, TOMORROW
 from taxel.detect.examples import unreliable
 from taxel.detect.scoring import score_rows
 from taxel.options import TrainOptions
@@ -276,7 +277,7 @@ class Training:
             yield f"{label}, the labels' own rule: {_mistakes(its)} of {its.events}: {own._compared()}"
 
     def _choice(self, label: str) -> str:
-        """Return what runs of a label, its mistakes and when it is known, each beside the other's."""
+        """Return what runs of a label, its mistakes, when it is known, and its worst day, each beside the other's."""
         events, scored = self.scored.neurons[label].events, self.scored
         if (choice := scored.choices.get(label)) is None:
             neuron = scored.neurons[label]
@@ -287,12 +288,20 @@ class Training:
         if runs.off or other.off:
             wrong += f", {runs.off} more than {choice.off_ms:g} ms off"
             others += f", {other.off}"
-        if choice.by_chance and (other.mistakes, other.off) < (runs.mistakes, runs.off):
-            others += ", which may be chance"
+        # What both make with each change, of what runs first.
+        changed = {name: of if names[0] == "neuron" else of[::-1] for name, of in choice.changed.items()}
+        if (other.mistakes, other.off) < (runs.mistakes, runs.off):
+            in_sum = [sum(of[n] for name, of in changed.items() if name in CHOOSING) for n in (0, 1)]
+            others += ", which may be chance" if choice.by_chance else f"; changed {in_sum[0]}, {names[1]} {in_sum[1]}"
         rule = scored.plain.rules[label]
         when = ", when the touch ends" * (names[0] == "rule" and rule is not None and rule.age_ms == "end")
         known = f"{_known(runs.known_ms)}{when}, {names[1]} {_late(other.known_ms)}"
-        return f"{label}: {names[0]} runs: {wrong} ({others}); {known}"
+        line = f"{label}: {names[0]} runs: {wrong} ({others}); {known}"
+        tomorrow = max((name for name in TOMORROW if name in changed), key=changed.__getitem__, default="")
+        if not tomorrow or changed[tomorrow] <= (runs.mistakes, other.mistakes):
+            return line
+        its, of_other = changed[tomorrow]
+        return f"{line}; with {tomorrow} {its} ({names[1]} {of_other})"
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing."""
