@@ -38,14 +38,23 @@ def walk(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("region", [HEEL, TOES, Region("slanted", ((0, 0), (30, 20), (5, 90)))])
 @pytest.mark.parametrize(
     ("measure", "name", "unit"),
-    [("load", "force_N", "N"), ("peak", "peak_kPa", "kPa"), ("mean", "mean_kPa", "kPa"), ("area", "area_mm2", "mm²")],
+    [
+        ("load", "force_N", "N"),
+        ("peak", "peak_kPa", "kPa"),
+        ("mean", "mean_kPa", "kPa"),
+        ("area", "area_mm2", "mm²"),
+        ("x", "centre_x_mm", "mm"),
+        ("y", "centre_y_mm", "mm"),
+    ],
 )
 def test_a_curve_is_a_measure_of_a_region_in_columns_of_time(
     walk: Path, region: Region, column_us: int, measure: Measure, name: str, unit: str
 ) -> None:
     recording = taxel.open(walk)
     frames = recording.frames()
-    force = np.nan_to_num(frames.region(region)[name])
+    # Where nothing is loaded there is no centre, and any other measure is 0.
+    force = frames.region(region)[name]
+    force = force if measure in ("x", "y") else np.nan_to_num(force)
     first = 480_000 // column_us
     loads = RegionLoads(walk.name, {"": recording}, 1)
     curve = loads.curve(region, measure, first, 600, column_us)
@@ -57,10 +66,25 @@ def test_a_curve_is_a_measure_of_a_region_in_columns_of_time(
         before = np.flatnonzero(frames.t <= start)
         if start <= frames.t[-1] and len(before):
             inside[before[-1]] = True
+        inside &= ~np.isnan(force)
         if not inside.any():
             assert found is None
         else:
             assert found == pytest.approx((force[inside].min(), force[inside].max()), abs=1e-3)
+
+
+def test_taxels_at_the_end_of_their_range_are_counted_where_a_file_states_it(tmp_path: Path, walk: Path) -> None:
+    frames = taxel.open(walk).frames()
+    facts = Facts(path=tmp_path, array=ARRAY, range_end=40.0)
+    loads = RegionLoads("walk", {"": Recording.of(InMemory(facts, frames))}, 1)
+    (curve,) = loads.curves([Drawn("toes", [], list(TOES.taxels))], "end", 0, 1, 10_000_000)
+    counts = frames.region(TOES, range_end=40.0)["at_range_end_taxels"]
+    assert (counts.min(), counts.max()) == (0, 2)
+    assert curve == [(0, 2)]
+    (reason,) = RegionLoads("walk", {"": taxel.open(walk)}, 1).curves(
+        [Drawn("toes", [], [(2, 0)])], "end", 8, 1, 64_000
+    )
+    assert "not known" in str(reason)
 
 
 def test_a_region_without_a_curve_has_the_reason_instead_and_others_keep_theirs(walk: Path) -> None:

@@ -30,7 +30,7 @@ _LEAST = 0.02
 #: Isobars, as shares of the largest value of a picture.
 _LEVELS = (0.2, 0.4, 0.6, 0.8)
 
-Measure = Literal["load", "peak", "mean", "area"]
+Measure = Literal["load", "peak", "mean", "area", "x", "y", "end"]
 Picture = Literal["maximum", "mean"]
 #: Least and greatest in columns of time; None where nothing is known.
 Curve = list[tuple[float, float] | None]
@@ -94,7 +94,13 @@ class RegionLoads:
             "peak": self._unit,
             "mean": self._unit,
             "area": "taxels" if areas is None else "mm²",
+            **dict.fromkeys("xy", self.array.centre_unit or ""),
+            "end": "taxels",
         }
+        # What a quiet stretch was subtracted from does not end where the taxel's range does.
+        ends = {sensor.range_end for sensor in sensors.values()}
+        is_as_read = all(rest.source == "unit" for *_, rest in found)
+        self._range_end = ends.pop() if len(ends) == 1 and is_as_read else None
 
     def _over(self, weights: NDArray[np.float64], part: slice, *, loaded: bool = False) -> NDArray[np.float32]:
         """Return the sum of values by their weights, or of the weights of loaded taxels, over time."""
@@ -107,11 +113,22 @@ class RegionLoads:
         return total
 
     def _measured(self, region: Region, measure: Measure, part: slice) -> NDArray[np.float32]:
-        """Return a measure of a region over time; 0 where nothing is loaded."""
+        """Return a measure of a region over time; 0 where nothing is loaded, and no centre."""
         shares = region.shares(self.array)
-        if measure == "peak":
+        if measure in ("peak", "end"):
             inside = self._values[region.centred(self.array), part]
-            return np.asarray(inside.max(axis=0, initial=0))
+            most = np.asarray(inside.max(axis=0, initial=0))
+            if measure == "peak":
+                return most
+            if self._range_end is None:
+                raise ProblemError("the end of a taxel's range is not known: the file does not state it")
+            return np.asarray(np.where(np.isnan(most), most, np.count_nonzero(inside >= self._range_end, axis=0)))
+        if measure in ("x", "y"):
+            places, total = self.array.positions()["xy".index(measure)], self._over(shares, part)
+            # Of several sensors within its own.
+            places = places - self._part_of(region)[1].x if measure == "x" else places
+            moment = self._over(np.nan_to_num(places) * shares, part)
+            return np.divide(moment, total, where=total > 0, out=np.full_like(total, np.nan))
         areas = shares * self._areas
         if measure == "load":
             return self._over(areas * self._in_n if self._in_n else shares, part)
@@ -235,17 +252,17 @@ class RegionLoads:
         """
         found = []
         for region in map(self._region, drawn):
-            columns = np.flatnonzero(region.shares(self.array).any(axis=0))
-            source = next(
-                (s for s, one in self._parts.items() if {*columns} <= {*range(one.columns.start, one.columns.stop)}),
-                None,
-            )
-            if source is None:
-                raise ProblemError(f"region {region.name}: lies on several sensors; draw one on each")
-            found.append(
-                replace(_shifted(region, self._parts[source], -1), source=source if len(self._parts) > 1 else "")
-            )
+            source, part = self._part_of(region)
+            found.append(replace(_shifted(region, part, -1), source=source if len(self._parts) > 1 else ""))
         return found
+
+    def _part_of(self, region: Region) -> tuple[str, _Part]:
+        """Return the sensor on which a region lies."""
+        columns = np.flatnonzero(region.shares(self.array).any(axis=0))
+        for source, part in self._parts.items():
+            if part.columns.start <= columns[0] and columns[-1] < part.columns.stop:
+                return source, part
+        raise ProblemError(f"region {region.name}: lies on several sensors; draw one on each")
 
     def drawn(self, regions: Sequence[Region]) -> list[dict[str, Any]]:
         """Return regions as the page has them.

@@ -514,7 +514,7 @@ export interface Regions {
   type: "regions";
   source: string;
   file: string;
-  units: Record<"load" | "peak" | "mean" | "area", string>;
+  units: Record<"load" | "peak" | "mean" | "area" | "x" | "y" | "end", string>;
   regions: DrawnRegion[];
 }
 
@@ -522,7 +522,7 @@ export interface Regions {
 export interface Loads {
   type: "loads";
   source: string;
-  measure: "load" | "peak" | "mean" | "area";
+  measure: "load" | "peak" | "mean" | "area" | "x" | "y" | "end";
   first: number;
   count: number;
   column_us: number;
@@ -734,7 +734,7 @@ export interface LoadsRequest {
   type: "loads";
   id?: number;
   regions: DrawnRegion[];
-  measure: "load" | "peak" | "mean" | "area";
+  measure: "load" | "peak" | "mean" | "area" | "x" | "y" | "end";
   first: number;
   count: number;
   column_us: number;

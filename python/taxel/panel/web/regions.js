@@ -58,7 +58,7 @@ export class Regions {
     this.source = "";
     this.file = "";
     /** The units of each measure. @type {import("./messages.js").Regions["units"]} */
-    this.units = { load: "", peak: "", mean: "", area: "" };
+    this.units = { load: "", peak: "", mean: "", area: "", x: "", y: "", end: "" };
     this.chooses = part("region-measure", HTMLSelectElement);
     this.chooses.onchange = () => this.show(true);
     /** What is drawn now. @type {"" | "rectangle" | "polygon" | "taxels"} */
