@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TypeVar, overload
-
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
@@ -17,31 +15,23 @@ from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
 from taxel.recording.analysis.pressure import above_rest
 
-F = TypeVar("F", bound=FigureBase)
-
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
 
 
-@overload
-def overview(recording: Recording, figure: None = None) -> Figure: ...
-@overload
-def overview(recording: Recording, figure: F) -> F: ...
-def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
+def overview(recording: Recording) -> Figure:
     """Draw events per second (or the sum of pressure) over time, and each taxel's activity (or largest pressure).
 
     Parameters
     ----------
     recording : Recording
-    figure : matplotlib.figure.FigureBase, optional
-        The figure or subfigure to draw in; default: a new one.
 
     Returns
     -------
-    matplotlib.figure.FigureBase
+    matplotlib.figure.Figure
 
     Raises
     ------
-    ProblemError : not a recording; not a figure of matplotlib
+    ProblemError : not a recording
     FormatError : the recording's file is damaged
 
     Examples
@@ -56,10 +46,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
     ('touch.npz', 'events/s')
     """
     instance("recording", recording, Recording)
-
-    if figure is None:
-        figure = plt.figure(figsize=(11, 4), layout="constrained")
-    over, where = instance("figure", figure, FigureBase).subplots(1, 2, width_ratios=(2, 1))
+    figure, (over, where) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained", width_ratios=(2, 1))
     if recording.has_events:
         events = recording.events
         begin_us = beginning_us(events.t)

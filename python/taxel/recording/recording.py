@@ -243,7 +243,7 @@ class Recording:
         if not calibration.array.fits(array) or calibration.reading_unit != unit:
             raise ProblemError(
                 f"{path}: the calibration is for {calibration.reading_unit} of {calibration.array!r}; {self.name} "
-                f"contains {unit} of {array!r}"
+                f"contains {unit} of {array!r}; where several sensors share a folder, name it after its recording"
             )
         is_part = view.columns is not None or view.rows is not None
         whole = slice(None)
