@@ -137,7 +137,7 @@ class Reading:
         ------
         ProblemError : an `array` that differs from the sensor that a file holds; a `rate_hz` of one with times
         """
-        from taxel.recording.reading_options import open_trials  # noqa: PLC0415  loads slowly
+        from taxel.recording.opening import open_trials  # noqa: PLC0415  loads slowly
 
         return open_trials(path, **vars(self))
 

@@ -83,7 +83,7 @@ def info(
         Print all facts about each recording of a folder.
     """
     from taxel.recording.kinds import is_folder, recordings_in  # noqa: PLC0415
-    from taxel.recording.reading_options import topics_in  # noqa: PLC0415
+    from taxel.recording.opening import topics_in  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
     if table is not None and table.suffix.lower() != ".csv":

@@ -23,7 +23,7 @@ from taxel.options import FullReading
 from taxel.panel import Panel
 from taxel.recording import Recording
 from taxel.recording.kinds import is_folder, recordings_in
-from taxel.recording.reading_options import topics_in
+from taxel.recording.opening import topics_in
 
 app = App(name="view")
 

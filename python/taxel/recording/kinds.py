@@ -132,8 +132,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
         return [_on_given(each, array) for each in read_array_file(path, layout or Layout(path))]
 
     def read_rows(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        readers = read_table(path, layout or Layout(path), array)
-        return [_on_given(each, array) for each in readers]
+        return [_on_given(each, array) for each in read_table(path, layout or Layout(path), array)]
 
     def read_events(path: Path, layout: Layout | None) -> Sequence[Reader]:
         return [read_records(path, layout.grid() if array is None and layout is not None else array)]
