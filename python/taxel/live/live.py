@@ -170,6 +170,8 @@ class Live(contextlib.AbstractContextManager["Live"]):
         self.unit: str = "ticks" if layout is None else layout[0]
         #: The length of frames of numbers, us; None of a board.
         self.frame_us: float | None = None if layout is None else layout[1]
+        #: Whether the source states that unit, as a board does; else it is the readout's.
+        self._states_unit = sources.states_unit
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
         #: How the lines that are read out were understood, if what they are was not stated; else "".

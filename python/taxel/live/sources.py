@@ -143,6 +143,11 @@ class Sources:
         """How the lines that are read out were understood, if what they are was not stated; else ""."""
         return "" if self._read is None else self._read.sensors[0].shape.read_as
 
+    @property
+    def states_unit(self) -> bool:
+        """Whether a board is received, or lines of which the unit is stated."""
+        return self._read is None or self._read.stated.unit is not None
+
     def begin(self, core: _core.Live) -> None:
         """Pass what arrives on."""
         for lines in self.lines:
