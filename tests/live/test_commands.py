@@ -61,3 +61,13 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, capfd: pyt
     recorded = taxel.open(tmp_path / "live.mcap")
     np.testing.assert_array_equal([line["t_us"] for line in lines], recorded.detections.t)
     np.testing.assert_array_equal(recorded.events.intensity, events.intensity)
+
+
+@pytest.mark.parametrize(("unit", "is_said"), [("", True), (",unit=N", False)])
+def test_the_unit_of_the_readout_is_assumed_only_where_none_is_stated(tmp_path: Path, unit: str, is_said: bool) -> None:
+    taxel.detect.PlainRule("load", 5.0, 1.0, noise_floor=1.0, unit="N").save(tmp_path / "rule.json")
+    (tmp_path / "mat.txt").write_text("".join(f"{20 * k},0,0,0,{k % 9}\n" for k in range(60)))
+    source = f"lines:{tmp_path / 'mat.txt'},array=2x2,time=1:ms{unit}"
+    done = run("live", "--readout", tmp_path / "rule.json", "--source", source, "--tare", 0.1, "--seconds", 1)
+    assert done.returncode == 0, done.stderr
+    assert ("assumed to be in N" in " ".join(done.stderr.split())) == is_said
