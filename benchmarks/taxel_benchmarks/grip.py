@@ -159,7 +159,7 @@ def run(*, quick: bool) -> dict[str, Any]:
     learnt, judged = (LEARNT[:2], JUDGED[:1]) if quick else (LEARNT, JUDGED)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        recipe = Recipe.load("touch", labels=tuple(MOST), noise_floor=6.0 * NOISE)
+        recipe = Recipe.load("grip", labels=tuple(MOST), noise_floor=6.0 * NOISE)
         readout = fit([Drawn(seed).example() for seed in learnt], recipe, window_ms=WINDOW_MS)
     labels = {label: {"events": 0, "missed": 0, "false": 0} for label in MOST}
     for seed in judged:

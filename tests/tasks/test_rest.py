@@ -204,3 +204,18 @@ def test_a_board_shows_its_rest_until_it_is_started(tmp_path: Path) -> None:
         taken = rest(taxel.open(tmp_path / name))
         assert (taken.source, taken.us) == ("quiet", (events.t[0], end))
         assert np.array_equal(taken.tare.rest, Tare.take(source, stop_us=end).rest, equal_nan=True)
+
+
+def test_z_says_where_taxels_of_three_axes_are_at_rest(tmp_path):
+    draw, names = np.random.default_rng(1), [f"{taxel}_{axis}" for taxel in "abcd" for axis in "xyz"]
+    values = draw.normal(500.0, 2.0, (600, 1, 12))
+    values[:, :, 0::3] += np.linspace(0.0, 4000.0, 600)[:, None, None]
+    values[300:400, :, 2::3] += 900.0
+    array = taxel.Array(1, 12, names=names)
+    made = taxel.Frames(values, 10_000 * np.arange(600), unit="counts", array=array)
+    taxel.convert(made, tmp_path / "a.npz")
+    taken = rest(taxel.open(tmp_path / "a.npz"))
+    begin, end = taken.us
+    inside = made.values[(made.t >= begin) & (made.t < end)].mean(axis=0)
+    assert end <= 3_000_000
+    np.testing.assert_allclose(taken.tare.rest, inside, atol=0.5)

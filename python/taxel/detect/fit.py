@@ -374,10 +374,10 @@ class Fitter:
         """From how far off a detection is part of a mistake, ms."""
         return OFF * self.window_ms if self._tuning is None else self._tuning.off_ms
 
-    def inside_loads(self, labels: Sequence[str]) -> dict[str, int]:
-        """Return how many events of each label lie within a load, farther from its begin and end than the window."""
-        assert self._loads is not None
-        return {label: self._loads.inside(label, round(float(to_us(self.window_ms)))) for label in labels}
+    @property
+    def within(self) -> set[str]:
+        """The labels that lie within touches, most of them."""
+        return set() if self._tuning is None else self._tuning.within
 
     def labels_in(self, label: str, parts: Sequence[Part]) -> list[NDArray[np.int64]]:
         """Return the events of a label in parts of the examples, us, ascending."""
@@ -451,7 +451,8 @@ class Fitter:
         if best is None:
             assert refused is not None
             raise refused
-        for caught in best.caught:
+        # What happens within a touch is for rules.
+        for caught in () if rule is not None and rule.touched_ms is not None else best.caught:
             warn(caught, stacklevel=5)
         return best
 

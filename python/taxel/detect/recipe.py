@@ -22,7 +22,7 @@ __all__ = ["Recipe", "change_values", "learner_from", "with_floor"]
 
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
-_OF_THE_FILE = ("fits", "also", "other")
+_OF_THE_FILE = ("fits", "also", "within", "other")
 
 
 class Point(NamedTuple):

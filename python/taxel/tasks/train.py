@@ -167,7 +167,18 @@ def _train(
         missed = {
             label for label, of_label in training.score.by_label.items() if 2 * of_label.missed >= of_label.events
         }
-        lines = off_loads(fitter.examples, missed) or list(_mistaken(training))
+        rules = training.readout.rules
+        beside = [
+            example._replace(
+                labels={
+                    label: times
+                    for label, times in example.labels.items()
+                    if label not in rules or rules[label].touched_ms is None
+                }
+            )
+            for example in fitter.examples
+        ]
+        lines = off_loads(beside, missed) or list(_mistaken(training))
         for line in [*lines, *(line for recording in opened for line in sensor_lines(recording))][:_LINES]:
             warn(line)
     return replace(training, unlabelled=unlabelled, constants_ms=constants, held_by=column)
@@ -273,22 +284,15 @@ def _examples(
 
 
 def _within_touches(fitter: Fitter) -> Iterator[str]:
-    """Yield the labels of ends of touches that lie within touches, where nothing is learnt.
+    """Yield the labels of ends of touches that lie within touches, where no rule finds them.
 
-    Where a rule finds them, touches are longer than what it finds the end of, as foam and drift make them.
+    Where a rule does, touches are longer than what it finds the end of, as foam and drift make them.
     """
-    lifts = [label for label in fitter.labels if recipes.neuron_of("touch", label) == "lift"]
-    if fitter.lacks or not lifts:
-        return
-    rules = fitter.rules(fitter.whole)
-    named = [label for label in lifts if rules[label] is None]
-    times = {label: np.concatenate(fitter.labels_in(label, fitter.whole)) for label in named}
-    for label, count in fitter.inside_loads(named).items():
-        if 2 * count > len(times[label]):
-            yield (
-                f"{label}: {count} of {counted(len(times[label]), 'label')} lie within touches, but {label} is read as "
-                "the end of a touch, and no rule finds it within one"
-            )
+    lifts = {label for label in fitter.within if recipes.neuron_of("touch", label) == "lift"}
+    rules = fitter.rules(fitter.whole) if lifts else {}
+    for label in sorted(lifts):
+        if rules[label] is None:
+            yield f"{label}: most labels lie within touches, but {label} is read as the end of a touch"
 
 
 def _trained(

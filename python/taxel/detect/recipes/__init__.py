@@ -5,7 +5,8 @@ UNIT": units of frames of a grid or of more than 32 channels, or "grids": frames
 what fits the unit, except labels of steps, as "foot_off", or "UNIT/": units of grids that begin so, before all else),
 the encoder, or several as `encoders` by name, whether
 labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what is a neuron's own
-(`neurons`), which labels are `also` called otherwise, and the parameters of any `other` label, or whose they are;
+(`neurons`), which labels are `also` called otherwise, of which one chooses it as they lie `within` touches, and the
+parameters of any `other` label, or whose they are;
 without `other` it is for its neurons' labels alone. A new recipe is a new file in this folder.
 """
 
@@ -90,6 +91,8 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
     ['gait_insole', 'touch']
     >>> [chosen(Frames([[[0.0]]], [0], unit=unit), ["tap"])[0] for unit in ("V", "N")]
     ['touch', 'gait_insole']
+    >>> chosen(Frames([[[0.0] * 6]], [0], unit="V"), ["lift", "slip"])
+    ('grip', 'slip within touches on 6 channels')
     """
     recipes = {name: read(name) for name in names()}
     recipe_for = {kind: name for name, values in recipes.items() for kind in values.get("fits", ())}
@@ -114,6 +117,8 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
     sensor = f"a grid of {array.rows} x {array.columns} taxels"
     if not is_grid:
         sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
+    if may_be_touches and (inside := {spelling(label) for label in labels} & set(recipes["grip"]["within"])):
+        return "grip", f"{', '.join(sorted(inside))} within touches on {sensor}"
     if not may_be_touches:
         return _ANY, f"{sensor} in {source.unit}"
     return touch, f"{'kinds of touch' if None in ends else ' and '.join(labels)} on {sensor}"

@@ -495,12 +495,27 @@ def of_frames(frames: Frames) -> Rest:
     """Return the rest of frames without a tare: 0 of force or pressure, else what a quiet stretch shows, or none."""
     if (zero := by_unit(frames)) is not None:
         return Rest("unit", zero)
+    if frames.array._has_axes:
+        return _of_axes(frames)
     if (found := in_quiet(frames)) is None:
         return Rest("none")
     tare = Tare.take(frames.held(), start_us=found[0][0], stop_us=found[0][1])
     taken = _unloaded(tare, Readings.of_frames(frames), found[1])
     # What values that fall with pressure rise by is no load.
     return Rest("quiet", tare, falls=True) if taken.tare is not None and fall(frames, found[0]) else taken
+
+
+def _of_axes(frames: Frames) -> Rest:
+    """Return the rest of channels that are axes of taxels: z says where the sensor was at rest."""
+    is_z = np.array([name.endswith("_z") for name in frames.array.names or ()])
+    z = frames.values.reshape(len(frames), -1)[:, is_z]
+    of_z = of_frames(Frames(z[:, None], frames.t, unit=frames.unit, array=Array(1, z.shape[1])))
+    if of_z.tare is None:
+        return of_z
+    tare = Tare.take(frames.held(), start_us=of_z.tare.start_us, stop_us=of_z.tare.stop_us)
+    rest = tare.rest.reshape(-1).copy()
+    rest[is_z] = of_z.tare.rest.reshape(-1)
+    return replace(of_z, tare=tare._with(rest=rest))
 
 
 def _of_events(recording: Recording) -> Rest:
