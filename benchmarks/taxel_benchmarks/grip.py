@@ -4,7 +4,7 @@ A drawn gripper: two fingertips of 5 x 4 taxels with three axes each, at 83 Hz, 
 taxel and lost lines. One pair of fingertips grasps, tries and bumps for a minute a recording: eight recordings are
 learnt, five of other seeds judged, within 50 ms, from all 120 values.
 
-Peer: none. Unit: missed and false, as a share of the labels of a name. Goals: what the best of all rules reached in a
+Peer: none. Unit: missed and false, as a share of the labels of a name. Goal: what the best of all rules reached in a
 trial on all axes, 9 of 45 lifts, 27 of 45 placements and 7 of 26 slips.
 """
 

@@ -269,7 +269,7 @@ class Fitter:
             except ProblemError as error:
                 if error.hint != "unfelt" or rules[label] is None:
                     raise
-                warn(f"{label}: its neuron feels nothing and never fires; its plain rule detects it", stacklevel=4)
+                warn(f"{label}: its neuron feels nothing and never fires; its plain rule detects it", stacklevel=3)
                 silent, points[label] = self._silent(label), plan.points_of(label)[0].values
                 learners[label], delays[label] = silent, silent.delay_ms
                 continue
@@ -453,7 +453,7 @@ class Fitter:
             raise refused
         # What happens within a touch is for rules.
         for caught in () if rule is not None and rule.touched_ms is not None else best.caught:
-            warn(caught, stacklevel=5)
+            warn(caught, stacklevel=4)
         return best
 
     def _fitted(

@@ -178,28 +178,19 @@ def judge_training(fitter: Fitter, trained: Trained) -> Judged:
 
 def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) -> Judged:
     """Return the scores of neurons, of rules, and of what was chosen, in the parts that each fold tests."""
-    found: list[list[Found]] = []
-    for fold, of_fold in zip(folds, trained, strict=True):
-        own = fitter.rules(fold.train, own=True)
-        found.append([fitter.detected(of_fold, fitter.scored(part), own) for part in fold.test])
-
-    def each(way: str) -> list[Detections]:
-        return [getattr(one, way) for of_fold in found for one in of_fold]
-
-    parts = [fitter.scored(part) for fold in folds for part in fold.test]
-    run = [
-        _run(one, of_fold.readout.by_rule)
-        for of_fold, parts_found in zip(trained, found, strict=True)
-        for one in parts_found
-    ]
-    neurons, rules = (fitter.score(each(way), parts) for way in ("by_neurons", "by_rules"))
+    tested = [(one, [fitter.scored(part) for part in fold.test]) for fold, one in zip(folds, trained, strict=True)]
+    owns = [fitter.rules(fold.train, own=True) for fold in folds]
+    parts = [part for _, each in tested for part in each]
+    found = [fitter.detected(one, part, own) for (one, each), own in zip(tested, owns, strict=True) for part in each]
+    by_rule = [one.readout.by_rule for one, each in tested for _ in each]
+    run = [_run(one, names) for one, names in zip(found, by_rule, strict=True)]
+    neurons, rules, of_own = (fitter.score([getattr(one, way) for one in found], parts) for way in Found._fields)
     best = fitter.rules(fitter.whole)
     tuned = {label: rule if rules[label].found else None for label, rule in best.items()}
     own_rules = fitter.rules(fitter.whole, own=True)
-    own_score = (own_rules, fitter.score(each("by_own"), parts)) if any(own_rules.values()) else None
+    own_score = (own_rules, of_own) if any(own_rules.values()) else None
     plain = PlainScore(tuned, None if fitter.lacks else rules, own_score, fitter.lacks)
     with_rules = [label for label in fitter.labels if tuned[label] is not None]
-    tested = [(one, [fitter.scored(part) for part in fold.test]) for fold, one in zip(folds, trained, strict=True)]
     choices = fitter.compared(with_rules, tested)
     better = tuple(label for label, choice in choices.items() if choice.by_rule)
     joined, truths, spans = _by_example(fitter, parts, run)
