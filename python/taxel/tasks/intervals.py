@@ -47,7 +47,7 @@ def by_intervals(each: Iterable[Lasting]) -> ByIntervals:
     Examples
     --------
     >>> by_intervals([(np.array([15, 18, 90]), np.array([[10, 20], [50, 60]]), (0, 100))])
-    by intervals 1 of 2 found, 1 detections outside: F1 0.50, by chance 0.27
+    by intervals 1 of 2 found, 1 detections outside: F1 0.50, by chance 0.19
     """
     recordings = list(each)
 
