@@ -51,7 +51,7 @@ impl Shear {
             }
         }
         let passed = self.t.replace(now.t).map_or(f64::INFINITY, |before| (now.t - before).max(0) as f64);
-        let step = -(-passed / SMOOTH_US).exp_m1();
+        let step = -libm::expm1(-passed / SMOOTH_US);
         for (smooth, sum) in self.sum.iter_mut().zip(sum) {
             *smooth += (step * (sum - f64::from(*smooth))) as f32;
         }
