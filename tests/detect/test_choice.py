@@ -100,6 +100,18 @@ def test_what_is_better_beyond_chance_runs_else_what_knows_much_earlier(neuron, 
     assert (choice.by_rule, choice.neuron.mistakes, choice.rule.mistakes) == (better == "rule", sum(neuron), sum(rule))
 
 
+@pytest.mark.parametrize(("found", "better"), [(40, "neuron"), (60, "rule")])
+def test_what_finds_nothing_is_not_better_where_noise_is_doubled(found, better):
+    events = 1_000_000 * np.arange(1, 101)
+    silent, other = (
+        [score(Detections(["on"] * len(t), t, t), {"on": events})]
+        for t in (events[:0], np.sort(np.concatenate([events[:found], events[:50] + 500_000])))
+    )
+    noisy = [score(Detections(["on"] * 999, t, t), {"on": events}) for t in [500_000 + 1_000_000 * np.arange(999)]]
+    choice = chosen(["on"], 10.0, (silent, other), {"noise x 1.5": (silent, noisy)})["on"]
+    assert ("rule" if choice.by_rule else "neuron") == better
+
+
 @pytest.mark.parametrize(
     ("neuron", "rule", "better", "by_chance"),
     [

@@ -59,7 +59,8 @@ def chosen(labels: Sequence[str], off_ms: float, recorded: Ways, changed: Mappin
     Better is what makes fewer mistakes as recorded and with the changes of `CHOOSING`, in sum, by more than a standard
     error of the paired difference over the parts; a detection farther off than `off_ms` is half of one. Where that is
     not told apart, what knows earlier by more than `off_ms` at the median is better, then what makes fewer, then what
-    knows earlier at all, then what is nearer to its label, and last the rule.
+    knows earlier at all, then what is nearer to its label, and last the rule. Where one of them finds nothing as
+    recorded, the mistakes as recorded decide alone: who finds nothing makes no mistake more when all is noise.
 
     Parameters
     ----------
@@ -90,7 +91,9 @@ def chosen(labels: Sequence[str], off_ms: float, recorded: Ways, changed: Mappin
         by_chance = abs(more.sum()) <= (np.sqrt(len(more)) * np.std(more, ddof=1) if len(more) > 1 else 0.0)
         # Neither may have found anything.
         earlier_ms = float(np.nan_to_num(neuron.known_ms - rule.known_ms))
-        if not by_chance or not abs(earlier_ms) > off_ms:
+        if np.isinf(neuron.known_ms) != np.isinf(rule.known_ms):
+            better = rule.mistakes <= neuron.mistakes
+        elif not by_chance or not abs(earlier_ms) > off_ms:
             better = (more.sum(), -earlier_ms, rule.error_ms) <= (0.0, 0.0, neuron.error_ms)
         else:
             better = earlier_ms > 0.0
