@@ -33,6 +33,7 @@ __all__ = [
     "ahead_us",
     "beside",
     "by_clock",
+    "by_label",
     "is_from_beginning",
     "rows_of",
     "source_of",
@@ -88,6 +89,14 @@ class Note:
     replaces: int | None = field(default=None, repr=False)
     lasts: int = field(default=0, repr=False)
     others: tuple[tuple[str, str], ...] = field(default=(), repr=False)
+
+
+def by_label(rows: Iterable[Note]) -> dict[str, NDArray[np.int64]]:
+    """Return the times of labels by what they say, us, ascending."""
+    times: dict[str, list[int]] = {}
+    for row in rows:
+        times.setdefault(row.text, []).append(row.t or 0)
+    return {label: np.sort(np.array(each, np.int64)) for label, each in times.items()}
 
 
 class Labels:
@@ -199,22 +208,7 @@ class Labels:
             t = recording.events.t if recording.has_events else recording.frames().t
             return int(t.min()) if len(t) else 0
 
-        return self._times(recording.path, source, trial, side, begin_us, lambda: recording.clock)
-
-    def _times(
-        self,
-        path: Path,
-        source: str,
-        trial: str,
-        side: str,
-        begin_us: Callable[[], int],
-        clock_of: Callable[[], Clock | None],
-    ) -> dict[str, NDArray[np.int64]]:
-        """Return the events of a source of the recording at this path; its begin and clock are read if needed."""
-        by_label: dict[str, list[int]] = {}
-        for row in self._of(path, source, trial, side, begin_us, clock_of):
-            by_label.setdefault(row.text, []).append(row.t or 0)
-        return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
+        return by_label(self._of(recording.path, source, trial, side, begin_us, lambda: recording.clock))
 
     def _of(
         self,

@@ -21,7 +21,7 @@ from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.detect.examples import early
 from taxel.detect.scoring import many
-from taxel.labels import Labels, Note, beside, by_clock, trial_of
+from taxel.labels import Labels, Note, beside, by_clock, by_label, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
 from taxel.spikes import to_ms, to_us
@@ -114,7 +114,7 @@ def _times(
 ) -> dict[str, NDArray[np.int64]]:
     """Return the events of a source of a recording, by its clock."""
     clock_of = partial(getattr, recording, "clock")
-    return table._times(recording.path, source, trial_name(recording), side, begin_us, clock_of)
+    return by_label(table._of(recording.path, source, trial_name(recording), side, begin_us, clock_of))
 
 
 def spans(
